@@ -38,7 +38,7 @@ pub use firmware::{
 pub use line_speed::{SpeedChange, change_line_speed};
 pub use link::{
     BoardKnowledge, BoardNews, Client, Continuity, Followed, Follower, HostClock, LastReading, LinkError, LostAxis,
-    ManagementLink, OpenError, OpenWire, Port, PortLock, PulseChain, ReaderMark, RepeatedStop, Told, Wire,
+    ManagementLink, OpenError, OpenWire, Patience, Port, PortLock, PulseChain, ReaderMark, RepeatedStop, Told, Wire,
     describe_port, fresh_session, is_candidate, is_held, is_st_link, is_wanted, open, send_stop, serial_ports,
     stop_beside,
 };

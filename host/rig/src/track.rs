@@ -23,8 +23,8 @@ pub struct JointSample {
 pub struct JointsAt {
     /// Interpolated counts of each axis from its zero.
     pub counts: Vec<f64>,
-    /// Standard deviation of each axis by itself, in counts: from the encoder's step, and from motion between two
-    /// readings that is not uniform.
+    /// Standard deviation of each axis by itself, in counts: from the rounding of readings to the encoder's step, and from
+    /// motion between two readings that is not uniform.
     pub sigma: Vec<f64>,
     /// Movement of each axis, in counts, while the instant is off by one standard deviation, with the sign of the
     /// motion. These errors are fully correlated, because the instant is common to all axes.
@@ -184,7 +184,9 @@ fn interpolate(previous: &JointSample, next: &JointSample, share: f64, bend: &[f
     for ((before, after), bend) in previous.counts.iter().zip(&next.counts).zip(bend) {
         let step = f64::from(after.0) - f64::from(before.0);
         joints.counts.push(f64::from(before.0) + share * step);
-        joints.sigma.push(UNIFORM.hypot(*bend));
+        // Two readings of an axis that moved are rounded by themselves; one that stands is rounded alike in both.
+        let rounding = if step.abs() > 1.0 { UNIFORM * (1.0 - share).hypot(share) } else { UNIFORM };
+        joints.sigma.push(rounding.hypot(*bend));
         joints.timing.push(UNIFORM * 2.0 * instant_error * step);
     }
     joints

@@ -27,6 +27,32 @@ proptest! {
     }
 }
 
+/// Readings of steady motions are rounded. What is between two of them is as uncertain as stated, standing and moving.
+#[test]
+fn rounding_is_as_large_as_stated() {
+    let mean_square = |rate: std::ops::Range<f64>| {
+        let (mut squares, trials) = (0.0, 20_000);
+        for trial in 0..trials {
+            // Fractions of multiples of irrational numbers are evenly spread.
+            let [phase, speed, share] =
+                [2f64.sqrt(), 3f64.sqrt(), 5f64.sqrt()].map(|root| (f64::from(trial) * root).fract());
+            let rate = rate.start + speed * (rate.end - rate.start);
+            let truth = |readings: f64| phase + rate * readings;
+            let mut track = JointTrack::new(4);
+            for n in 0..4u8 {
+                track.push(sample(10_000 * u64::from(n), &[truth(f64::from(n)).round() as i32]));
+            }
+            let joints = track.at(instant(10_000.0 * (1.0 + share))).expect("covered");
+            squares += ((joints.counts[0] - truth(1.0 + share)) / joints.sigma[0]).powi(2);
+        }
+        squares / f64::from(trials)
+    };
+    let (standing, moving) = (mean_square(0.0..1e-9), mean_square(3.0..40.0));
+    assert!((0.97..1.03).contains(&standing), "standing {standing}");
+    // The change of a step by one count is taken for a change of speed too.
+    assert!((0.85..1.03).contains(&moving), "moving {moving}");
+}
+
 #[test]
 fn instants_outside_the_track_are_refused() {
     let mut track = JointTrack::new(3);
@@ -81,10 +107,10 @@ fn an_uncertain_instant_adds_the_distance_moved_in_it() {
     track.push(sample(0, &[0]));
     track.push(sample(10_000, &[1000]));
     let at = |error_us| track.at(BoardInstant { us: 5_000.0, error_us }).expect("covered");
-    // One count, uniform: 1/√12. Plus or minus 100 us at 0.1 counts/us: 20 counts, uniform.
-    assert!((at(0.0).sigma[0] - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+    // One count, uniform, in each of two readings: 1/√12, and 1/√2 of it in their mean. Plus or minus 100 us at 0.1 counts/us: 20 counts, uniform.
+    assert!((at(0.0).sigma[0] - 1.0 / 24f64.sqrt()).abs() < 1e-12);
     assert!((at(0.0).timing[0]).abs() < 1e-12);
-    assert!((at(100.0).sigma[0] - 1.0 / 12f64.sqrt()).abs() < 1e-12);
+    assert!((at(100.0).sigma[0] - 1.0 / 24f64.sqrt()).abs() < 1e-12);
     assert!((at(100.0).timing[0] - 20.0 / 12f64.sqrt()).abs() < 1e-9);
 }
 

@@ -1,7 +1,5 @@
 //! A handle to an open session: it asks the board through the task that owns the wire.
 
-use std::time::Duration;
-
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::timeout;
 use vergence_protocol::{Compatibility, HostStatistics, PoseReport, Report, Request, SessionId, TriggerMark};
@@ -12,11 +10,9 @@ use super::clock::HostClock;
 use super::error::{LinkError, OpenError};
 use super::follow::Broadcaster;
 use super::knowledge::BoardKnowledge;
-use super::open::{OpenWire, Port};
+use super::open::{OpenWire, Patience, Port};
 use super::task::{Command, LinkTask, Outlets};
 
-/// Longest wait for the reply to a request, retransmissions included.
-const REPLY_TIMEOUT: Duration = Duration::from_secs(2);
 /// Trigger pulses that are kept until they are taken: seconds of them at the highest rate.
 const MARKS_KEPT: usize = 2_048;
 /// Pieces of log that are kept until they are taken: more than the board keeps.
@@ -34,6 +30,7 @@ pub struct Client {
     clock: HostClock,
     session: SessionId,
     compatibility: Compatibility,
+    patience: Patience,
 }
 
 /// What outlives a link, so that the link after it goes on: the host's clock, and what the board told.
@@ -57,9 +54,10 @@ impl Client {
     /// Opens session `session` over `wire`; `continuity` is that of the link before it, where there was one. Must be called inside a tokio runtime: it starts a task that owns the wire.
     ///
     /// # Errors
-    /// [`LinkError`] where the board does not answer within two seconds.
+    /// [`LinkError`] where the board does not answer in time ([`Patience::reply`]).
     pub async fn connect(wire: OpenWire, session: SessionId, continuity: Continuity) -> Result<Self, LinkError> {
         let Continuity { clock, knowledge } = continuity;
+        let patience = wire.patience;
         let (commands, inbox) = mpsc::channel(16);
         let (pose_sender, poses) = watch::channel(None);
         let (mark_sender, marks) = mpsc::channel(MARKS_KEPT);
@@ -77,13 +75,13 @@ impl Client {
             end_sender.send_replace(Some(error));
         });
         let compatibility = opened.await.unwrap_or(Err(LinkError::SessionLost))?;
-        Ok(Self { commands, poses, marks, logs, end, knowledge, attention, clock, session, compatibility })
+        Ok(Self { commands, poses, marks, logs, end, knowledge, attention, clock, session, compatibility, patience })
     }
 
     /// As [`Self::connect`], over a wire that leads to `port`.
     ///
     /// # Errors
-    /// [`OpenError::Unanswered`] where the board does not answer within two seconds.
+    /// [`OpenError::Unanswered`] where the board does not answer in time ([`Patience::reply`]).
     pub async fn at(
         port: &Port,
         wire: OpenWire,
@@ -118,7 +116,7 @@ impl Client {
         Continuity { clock: self.clock, knowledge: self.knowledge.clone() }
     }
 
-    /// Sends a request and waits for the board's reply, for at most two seconds.
+    /// Sends a request and waits for the board's reply, for at most [`Patience::reply`].
     ///
     /// # Errors
     /// [`LinkError`] where the link ended or the board stayed silent.
@@ -126,10 +124,10 @@ impl Client {
         self.attention.pay(self.clock.now());
         let (reply, answer) = oneshot::channel();
         self.commands.send(Command::Ask { request, reply }).await.map_err(|_| self.why_ended())?;
-        match timeout(REPLY_TIMEOUT, answer).await {
+        match timeout(self.patience.reply, answer).await {
             Ok(Ok(result)) => result,
             Ok(Err(_)) => Err(self.why_ended()),
-            Err(_) => Err(LinkError::Silent(REPLY_TIMEOUT)),
+            Err(_) => Err(LinkError::Silent(self.patience.reply)),
         }
     }
 
@@ -146,16 +144,16 @@ impl Client {
     /// Waits for the next pose from the board; poses that nobody waited for are skipped.
     ///
     /// # Errors
-    /// [`LinkError`] where the link ended, or no pose came within a second.
+    /// [`LinkError`] where the link ended, or no pose came in time ([`Patience::pose`]).
     pub async fn next_pose(&mut self) -> Result<PoseReport, LinkError> {
-        const PATIENCE: Duration = Duration::from_secs(1);
-        match timeout(PATIENCE, self.poses.changed()).await {
+        let patience = self.patience.pose;
+        match timeout(patience, self.poses.changed()).await {
             Ok(Ok(())) => {
                 self.attention.pay(self.clock.now());
-                self.poses.borrow_and_update().clone().ok_or(LinkError::Silent(PATIENCE))
+                self.poses.borrow_and_update().clone().ok_or(LinkError::Silent(patience))
             }
             Ok(Err(_)) => Err(self.why_ended()),
-            Err(_) => Err(LinkError::Silent(PATIENCE)),
+            Err(_) => Err(LinkError::Silent(patience)),
         }
     }
 

@@ -24,7 +24,7 @@ pub use follow::{Followed, Follower};
 pub use knowledge::{BoardKnowledge, BoardNews, LastReading};
 pub use lost_encoders::{LostAxis, Told};
 pub use management::ManagementLink;
-pub use open::{OpenWire, Port, Wire, open};
+pub use open::{OpenWire, Patience, Port, Wire, open};
 pub use port_lock::{PortLock, ReaderMark, is_held, is_wanted};
 pub use ports::{describe_port, is_candidate, is_st_link, serial_ports};
 pub use pulses::PulseChain;

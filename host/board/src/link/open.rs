@@ -63,14 +63,32 @@ pub struct OpenWire {
     pub lock: Option<PortLock>,
     /// Bits per second of a serial line; `None` where bytes take no time.
     pub baud: Option<u32>,
+    /// How long the board at the other end may be silent.
+    pub patience: Patience,
 }
 
 impl OpenWire {
     /// A wire inside this process.
     #[must_use]
     pub fn in_process(stream: impl Wire + 'static) -> Self {
-        Self { stream: Box::new(stream), lock: None, baud: None }
+        Self { stream: Box::new(stream), lock: None, baud: None, patience: Patience::IN_PROCESS }
     }
+}
+
+/// How long a board may be silent until its link counts as lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Longest wait for the next pose.
+    pub pose: Duration,
+    /// Longest wait for the reply to a request, retransmissions included, and for the answer to the first message.
+    pub reply: Duration,
+}
+
+impl Patience {
+    /// Of a board that runs by itself.
+    pub const PORT: Self = Self { pose: Duration::from_secs(1), reply: Duration::from_secs(2) };
+    /// Of a simulated board in this process: it runs only when a busy computer lets it, and cannot be unplugged.
+    pub const IN_PROCESS: Self = Self { pose: Duration::from_secs(10), reply: Duration::from_secs(10) };
 }
 
 /// Opens a serial device at `baud` bits per second, or a TCP address. A vergence that only reads the device makes way. With
@@ -89,7 +107,7 @@ pub async fn open(port: &Port, baud: u32, share: bool) -> Result<OpenWire, OpenE
             stream
                 .set_nodelay(true)
                 .map_err(|error| OpenError::TcpOption { address: address.clone(), problem: error.to_string() })?;
-            Ok(OpenWire { stream: Box::new(stream), lock: None, baud: None })
+            Ok(OpenWire { stream: Box::new(stream), lock: None, baud: None, patience: Patience::PORT })
         }
         Port::Simulated(_) => Err(OpenError::Simulated),
     }
@@ -110,7 +128,7 @@ async fn open_serial(path: &Path, baud: u32, share: bool) -> Result<OpenWire, Op
     let serial = port.open_native_async().map_err(|error| fail(&error))?;
     // Bytes that an earlier session left unread belong to that session.
     serial.clear(serialport::ClearBuffer::Input).map_err(|error| fail(&error))?;
-    Ok(OpenWire { stream: Box::new(serial), lock, baud: Some(baud) })
+    Ok(OpenWire { stream: Box::new(serial), lock, baud: Some(baud), patience: Patience::PORT })
 }
 
 /// Longest wait for a reader to make way.

@@ -2,7 +2,6 @@
 //! arrives.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::sync::{mpsc, oneshot, watch};
@@ -21,8 +20,6 @@ use super::knowledge::{BoardKnowledge, BoardNews};
 use super::open::OpenWire;
 use super::repeated_stop::RepeatedStop;
 
-/// Longest wait for the answer to the first Hello.
-const HELLO_TIMEOUT: Duration = Duration::from_secs(2);
 /// Periods of the clock probes: fast at first, then slow. They are odd so that they do not keep step with the latency timer
 /// of a USB bridge.
 const PROBE_FAST_US: u64 = 98_390;
@@ -98,7 +95,8 @@ impl LinkTask {
     /// Runs until the link ends or the client is dropped.
     pub(super) async fn run(mut self, mut wire: OpenWire) -> LinkError {
         self.session.hello();
-        let hello_deadline = Microseconds(self.clock.now().0 + HELLO_TIMEOUT.as_micros() as u64);
+        let patience = wire.patience.reply;
+        let hello_deadline = Microseconds(self.clock.now().0 + patience.as_micros() as u64);
         let mut input = [0; 1024];
         loop {
             if let Err(error) = self.flush(&mut wire).await {
@@ -127,7 +125,7 @@ impl LinkTask {
             }
             if self.opened.is_some() && self.clock.now() >= hello_deadline {
                 let error =
-                    if self.received > 0 { LinkError::Noise(self.received) } else { LinkError::Silent(HELLO_TIMEOUT) };
+                    if self.received > 0 { LinkError::Noise(self.received) } else { LinkError::Silent(patience) };
                 return self.lose(error);
             }
         }
