@@ -55,6 +55,7 @@ struct RigFile {
     left: SideFile,
     right: SideFile,
     trunk: Option<TrunkFile>,
+    repeatability: Option<SigmaFile>,
     calibration_sigma: Option<SigmaFile>,
     calibration: Option<CalibrationTables>,
     /// Information for people; nothing depends on it.
@@ -159,6 +160,7 @@ impl Rig {
             right_chain: chain("right", &file.right, &axes)?,
             trunk,
             calibration: RigCalibration::Unknown,
+            repeatability: file.repeatability.as_ref().map(SigmaFile::repeatability).transpose()?,
             axes,
         };
         let calibration = match (&file.calibration, &file.calibration_sigma) {

@@ -28,6 +28,7 @@ mod mode_policy;
 mod moving;
 mod pitch;
 mod pose;
+mod repeatability;
 mod rig;
 mod text;
 mod to_toml;
@@ -53,6 +54,7 @@ pub use mode_policy::{ModeChoice, ModeFigures, ModePolicy, PolicyRule, TargetBel
 pub use moving::{MiddlePose, middle_pose, moving_cloud};
 pub use pitch::{PitchTable, PitchTableError};
 pub use pose::RigPose;
+pub use repeatability::Repeatability;
 pub use rig::Rig;
 pub use track::{JointSample, JointTrack, Joints, JointsAt, SteadyMotion, TrackGap};
 pub use trunk::{

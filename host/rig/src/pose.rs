@@ -64,16 +64,25 @@ impl RigPose {
 }
 
 impl Rig {
-    /// The pose with the axes at exactly `values` (millimetres or radians), uncertain by the calibration alone; of a trunk by the play
-    /// of its joints as well, which is larger than any reading's error.
+    /// The pose with the axes at exactly `values` (millimetres or radians), uncertain by the calibration and by how well the rig returns;
+    /// of a trunk by the play of its joints as well, which is larger than any reading's error.
     #[must_use]
     pub fn pose_at_values(&self, values: &[f64]) -> RigPose {
         if self.trunk.is_none() {
-            return self.calibrated(values, values, &self.calibration_covariance(values, values));
+            let mut pose = self.calibrated(values, values, &self.calibration_covariance(values, values));
+            self.add_return(&mut pose);
+            return pose;
         }
         let exactly = vec![0.0; self.axes.len()];
         let counts = self.axes.iter().zip(values).map(|(axis, &value)| axis.counts_at(value)).collect();
         self.pose(&JointsAt { counts, sigma: exactly.clone(), timing: exactly })
+    }
+
+    /// Adds how far the right camera returns beside where the axes put it.
+    fn add_return(&self, pose: &mut RigPose) {
+        if let Some(repeatability) = self.repeatability {
+            pose.add_spread(&repeatability.covariance());
+        }
     }
 
     /// The pose with the axes of the left and of the right camera at exactly these values, uncertain by the calibration; that of a
@@ -168,6 +177,7 @@ impl Rig {
         }
         pose.rotation_sigma = Angle::from_rad(rotation);
         pose.translation_sigma = Length::from_mm(translation);
+        self.add_return(&mut pose);
         if let Some(trunk) = &self.trunk {
             let spread = self.trunk_spread(trunk, left, right, &exact.1);
             pose.add_spread(&spread);

@@ -12,6 +12,7 @@ use crate::chain::Chain;
 use crate::exposure::Shutter;
 use crate::mask::CameraMask;
 use crate::mode::{Mode, ReportedMode};
+use crate::repeatability::Repeatability;
 use crate::trunk::RigTrunk;
 
 /// A rig: its axes, modes and cameras, and the screw chains or the trunk by which the axes move the cameras.
@@ -39,6 +40,8 @@ pub struct Rig {
     pub trunk: Option<Box<RigTrunk>>,
     /// How far its numbers may be off.
     pub calibration: RigCalibration,
+    /// How far the right camera returns beside where the axes put it; `None` where that is not known, and counts as nothing.
+    pub repeatability: Option<Repeatability>,
 }
 
 impl Rig {
@@ -62,6 +65,7 @@ impl Rig {
             right_chain: Chain::new(Vec::new(), left_from_right.renamed()),
             trunk: None,
             calibration: RigCalibration::Unknown,
+            repeatability: None,
         }
     }
 

@@ -21,6 +21,8 @@ struct File<'a> {
     axis: Vec<Axis<'a>>,
     modes: BTreeMap<&'a str, ModeTable<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    repeatability: Option<Sigma>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     calibration_sigma: Option<Sigma>,
     #[serde(skip_serializing_if = "Option::is_none")]
     calibration: Option<CalibrationTables>,
@@ -115,6 +117,9 @@ impl Rig {
                     (mode.name.as_str(), ModeTable { number: mode.number.0, positions })
                 })
                 .collect(),
+            repeatability: self
+                .repeatability
+                .map(|found| Sigma { rotation: angle(found.rotation), translation: length(found.translation) }),
             calibration_sigma: match self.calibration {
                 RigCalibration::Sigmas { rotation, translation } => {
                     Some(Sigma { rotation: angle(rotation), translation: length(translation) })

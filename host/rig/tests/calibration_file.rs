@@ -1,7 +1,7 @@
 //! The covariance of a calibration in the rig file: what is refused, and what poses make of it.
 #![allow(clippy::expect_used, clippy::unwrap_used, clippy::panic, reason = "a test fails loudly")]
 
-use vergence_rig::{BENCH_TOML, Rig, RigCalibration};
+use vergence_rig::{BENCH_TOML, Provenance, Rig, RigCalibration};
 use vergence_vision::LENS_PARAMETERS;
 
 /// The bench without a word on its calibration.
@@ -45,6 +45,25 @@ fn numbers_move_pose_and_lenses_by_their_units() {
     assert!((half.matrix()[(0, 0)] - 0.0625).abs() < 1e-12);
 }
 
+/// In the same way whatever is known of the calibration, also where a pose is planned.
+#[test]
+fn repeatability_enters_every_pose() {
+    let rig = with("[repeatability]\nrotation = \"0.05deg\"\ntranslation = \"0.2mm\"\n").unwrap();
+    let provenance = Provenance { program: String::new(), inputs_sha256: String::new(), date: None };
+    let read_back = Rig::from_toml(&rig.to_toml(&provenance).unwrap()).unwrap();
+    assert_eq!(read_back.repeatability, rig.repeatability);
+    let exact = with("").unwrap();
+    let turn = 0.05f64.to_radians();
+    for (with, without) in [
+        (rig.pose_at_values(&HUMAN), exact.pose_at_values(&HUMAN)),
+        (read_back.pose_read_at(&HUMAN), exact.pose_read_at(&HUMAN)),
+    ] {
+        let more = with.covariance() - without.covariance();
+        assert!((more[(0, 0)] - turn * turn).abs() < 1e-12 && (more[(5, 5)] - 0.04).abs() < 1e-12, "{more}");
+        assert!(with.rotation_sigma.rad() >= turn && !with.is_calibration_known);
+    }
+}
+
 #[test]
 fn tables_that_contradict_are_refused_with_the_reason() {
     let numbers = "numbers = [\"right.at_zero.origin.x\", \"left.camera.fx\"]";
@@ -68,6 +87,7 @@ fn tables_that_contradict_are_refused_with_the_reason() {
             "leave one of them out",
         ),
         ("[calibration_sigma]\nrotation = \"-0.1deg\"\ntranslation = \"1mm\"".into(), "negative"),
+        ("[repeatability]\nrotation = \"0.1deg\"\ntranslation = \"-1mm\"".into(), "[repeatability]"),
     ] {
         let refused = with(&table).expect_err(&table);
         assert!(refused.contains(said), "{refused}");

@@ -42,6 +42,13 @@ pub fn stage_lines(stage: &StageCalibration, held_out: &[HeldOutPose]) -> Vec<St
             "  play of {axis}: {play}. The images put it so far beside its readings: it has play, or its screw or rail is not straight or even"
         ));
     }
+    lines.extend(stage.repeatability.map(|found| {
+        let (turn, shift) = (found.rotation.deg(), found.translation.mm());
+        format!(
+            "  returns: the right camera stands {turn:.4}° and {shift:.4} mm beside where the axes put it, in each component, differently at every \
+             stage pose: a carriage tilts, or a mount gives"
+        )
+    }));
     lines.extend(stage.warp.map(|warp| format!("  {}", bow_in_words(&warp))));
     for skipped in &stage.skipped {
         lines.push(format!("  view not used: {} ({} camera: {})", skipped.view, skipped.side, skipped.reason));
@@ -127,6 +134,9 @@ pub fn stage_json(rig: &Rig, stage: &StageCalibration, held_out: &[HeldOutPose])
         "scales": scales,
         "zero_offsets": zeros,
         "plays": plays,
+        "repeatability": stage.repeatability.map(|found| {
+            json!({ "rotation_deg": found.rotation.deg(), "translation_mm": found.translation.mm() })
+        }),
         "at_zero": {
             "translation_mm": stage.at_zero.left_from_right.origin().mm().as_slice(),
             "rotation_vector": stage.at_zero.left_from_right.rotation().scaled_axis().as_slice(),

@@ -65,6 +65,6 @@ fn moved_by(state: &State, unknown: Unknown, nth: usize) -> Vec<(RigNumber, f64)
         Unknown::Scale { axis } => {
             vec![(RigNumber::Scale { axis }, 1.0 / state.scales.get(axis).copied().unwrap_or(1.0))]
         }
-        Unknown::Reading { .. } => Vec::new(),
+        Unknown::Reading { .. } | Unknown::Return { .. } => Vec::new(),
     }
 }

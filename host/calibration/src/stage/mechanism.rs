@@ -9,7 +9,7 @@ use vergence_rig::{Link, Screw};
 use vergence_vision::Point;
 
 use crate::extrinsics::Side;
-use crate::reprojection::moved;
+use crate::reprojection::{POSE, moved};
 use crate::stage::twist::{Twist, across, as_move, carried, of_move, of_screw, slide, turn};
 use crate::stage::unknowns::{Ordinal, Unknown};
 
@@ -24,6 +24,9 @@ pub(crate) struct State {
     pub scales: Vec<f64>,
     /// Error of the reading of each axis at each stage pose, in millimetres or radians.
     pub reading_errors: Vec<Vec<f64>>,
+    /// How far the right camera is from where the mechanism puts it at each stage pose, in its own frame there; empty where it
+    /// counts as exact.
+    pub returns: Vec<Isometry3<f64>>,
 }
 
 /// The mechanism at given encoder readings.
@@ -47,17 +50,26 @@ impl State {
         posed.chain(Side::Left).inverse() * posed.chain(Side::Right)
     }
 
-    /// The move of [`Self::left_from_right`] by each unknown; readings' errors are those of stage pose `pose`.
+    /// How far the right camera is from where the mechanism puts it at stage pose `pose`, in its own frame.
+    pub fn returned(&self, pose: Option<usize>) -> Isometry3<f64> {
+        pose.and_then(|pose| self.returns.get(pose)).copied().unwrap_or_else(Isometry3::identity)
+    }
+
+    /// The move of the right camera against the left one by each unknown; errors of readings and returns are those of stage
+    /// pose `pose`.
     pub fn derivative(&self, readings: &[f64], unknowns: &[Unknown], pose: Option<usize>) -> Matrix6xX<f64> {
         let posed = Posed { state: self, readings };
         let left_from_base = posed.chain(Side::Left).inverse();
-        let left_from_right = left_from_base * posed.chain(Side::Right);
+        let by_mechanism = left_from_base * posed.chain(Side::Right);
+        let left_from_right = by_mechanism * self.returned(pose);
         let mut nth = Ordinal::default();
         let columns: Vec<Twist> = unknowns
             .iter()
-            .map(|&unknown| {
-                let in_base = posed.twist(unknown, nth.next(unknown), pose);
-                as_move(&left_from_right, &carried(&left_from_base, &in_base))
+            .map(|&unknown| match (unknown, nth.next(unknown)) {
+                (Unknown::Return { pose: of }, nth) if pose == Some(of) => turned(&by_mechanism.rotation, nth),
+                (unknown, nth) => {
+                    as_move(&left_from_right, &carried(&left_from_base, &posed.twist(unknown, nth, pose)))
+                }
             })
             .collect();
         Matrix6xX::from_columns(&columns)
@@ -74,6 +86,7 @@ impl State {
         let mut next = self.clone();
         let mut nth = Ordinal::default();
         let mut base_move = Twist::zeros();
+        let mut returned = vec![Twist::zeros(); self.returns.len()];
         for (&unknown, &amount) in unknowns.iter().zip(step) {
             let nth = nth.next(unknown);
             match unknown {
@@ -98,11 +111,21 @@ impl State {
                 Unknown::Position => base_move[3 + nth % 3] = amount,
                 Unknown::Scale { axis } => next.scales[axis] += amount,
                 Unknown::Reading { pose, axis } => next.reading_errors[pose][axis] += amount,
+                Unknown::Return { pose } => returned[pose][nth % POSE] = amount,
             }
         }
+        next.returns.iter_mut().zip(&returned).for_each(|(pose, by)| *pose = moved(pose, by));
         next.right_at_zero = moved(&self.right_at_zero, &base_move);
         next
     }
+}
+
+/// The move of a camera by component `nth` of a move in its own frame, which is turned by `rotation`.
+fn turned(rotation: &UnitQuaternion<f64>, nth: usize) -> Twist {
+    let axis = rotation * Vector3::ith(nth % 3, 1.0);
+    let mut twist = Twist::zeros();
+    twist.fixed_rows_mut::<3>(3 * (nth / 3 % 2)).copy_from(&axis);
+    twist
 }
 
 /// Direction of a slide, or of the line of a turn.
@@ -150,7 +173,7 @@ impl Posed<'_> {
             Unknown::Reading { pose: of, axis } if pose == Some(of) => {
                 self.by_position(axis) * self.state.scales.get(axis).copied().unwrap_or(1.0)
             }
-            Unknown::Reading { .. } => Twist::zeros(),
+            Unknown::Reading { .. } | Unknown::Return { .. } => Twist::zeros(),
         }
     }
 

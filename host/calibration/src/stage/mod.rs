@@ -5,7 +5,8 @@
 //! jointly on all corners. Afterwards the relative pose is known wherever the axes stand, with its covariance.
 //!
 //! Readings that are off by more than a step of the encoder show play, or a mechanism that is not one of screws: their standard deviation is
-//! estimated, and the file states it as the play of the axis.
+//! estimated, and the file states it as the play of the axis. Cameras that return to a pose turned or shifted beside where the axes put them,
+//! differently each time, are freed to do so, and the file states how far as the rig's repeatability.
 //!
 //! The base frame is held by the left camera with all axes at zero, which stays where the drawing has it; the encoders'
 //! zeros are part of the right camera's pose there.
@@ -22,15 +23,23 @@ pub(crate) mod start;
 mod twist;
 mod unknowns;
 
+use nalgebra::Isometry3;
 use vergence_rig::{AxisPosition, Rig};
 use vergence_vision::{Angle, Length};
 
-use crate::extrinsics::{ExtrinsicsError, LensKnowledge, Start, StereoView, Task};
+use crate::extrinsics::{ExtrinsicsError, Fit, LensKnowledge, Start, StereoView, Task};
+use crate::stage::mechanism::State;
 use crate::stage::model::Model;
+use crate::stage::start::Prepared;
 
 pub use enough_views::with_enough_views;
 pub use observability::{Observability, WeakDirection};
 pub use result::{EncoderScale, FittedScrew, PredictedPose, StageCalibration, StagePoseFigures, ZeroOffset};
+
+/// Where views scatter by more of their corners' noise, the stage may not return to where its mechanism puts it.
+const MOST_SCATTER: f64 = 1.1;
+/// How far returns to a stage pose may be off while it is asked how far they are, in radians and millimetres: as far as any stage's.
+const FREE_RETURNS: [f64; 2] = [5e-3, 0.5];
 
 /// Least number of stage poses: fewer cannot separate a slide, a turn and the pose at zero.
 pub const FEWEST_STAGE_POSES: usize = 3;
@@ -147,25 +156,22 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
     let state = start::fitted_to_poses(&model, &alone).ok_or(StageError::Diverged)?;
     let prepared =
         start::prepare(rig, state, poses, |state, pose| state.left_from_right(&model.corrected(state, pose)))?;
-    let mut model = Model { pose_of_view: prepared.pose_of_view, ..model };
-    let lenses = prepared.shared.lenses;
-    let usable = || prepared.usable.clone();
-    let fitted = |model: &Model, start| {
-        let task = Task {
-            kinematics: model,
-            views: &prepared.views,
-            own_poses: &prepared.own_poses,
-            lenses,
-            knowledge: &options.lenses,
-            robust: options.robust,
-        };
-        task.fit(start).map_err(|reason| StageError::Joint(reason.into()))
-    };
-    let start = Start { shared: prepared.shared, targets: prepared.targets, usable: usable() };
-    let mut fit = fitted(&model, start)?;
+    let mut model = Model { pose_of_view: prepared.pose_of_view.clone(), ..model };
+    let stated = model.reading_sigma.clone();
+    let fitting = Fitting { prepared: &prepared, poses: poses.len(), options };
+    let mut fit = fitting.fit(&model, fitting.first())?;
     if let Some(reading_sigma) = play::reading_sigma(&model, &fit) {
         model.reading_sigma = reading_sigma;
-        fit = fitted(&model, Start { shared: fit.shared, targets: fit.targets, usable: usable() })?;
+        fit = fitting.fit(&model, fitting.again(&fit))?;
+    }
+    if fit.covariance.as_ref().is_some_and(|found| found.scatter > MOST_SCATTER) {
+        let mut free = Model { reading_sigma: stated.clone(), ..model.with_returns(FREE_RETURNS) };
+        let freed = fitting.fit(&free, fitting.again(&fit))?;
+        if let Some((reading_sigma, return_sigma)) = play::sigma_of_returns(&free, &freed, &stated) {
+            (free.reading_sigma, free.return_sigma) = (reading_sigma, Some(return_sigma));
+            fit = fitting.fit(&free, fitting.again(&freed))?;
+            model = free;
+        }
     }
     let observability = observability::observability(rig, &model, &fit, &alone);
     result::calibration(result::Material {
@@ -177,4 +183,38 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
         views: &prepared.views,
         usable: &prepared.usable,
     })
+}
+
+/// The fits of one calibration: all use the same views.
+struct Fitting<'a> {
+    prepared: &'a Prepared<State>,
+    poses: usize,
+    options: &'a StageOptions,
+}
+
+impl Fitting<'_> {
+    fn fit(&self, model: &Model, start: Start<State>) -> Result<Fit<State>, StageError> {
+        let task = Task {
+            kinematics: model,
+            views: &self.prepared.views,
+            own_poses: &self.prepared.own_poses,
+            lenses: self.prepared.shared.lenses,
+            knowledge: &self.options.lenses,
+            robust: self.options.robust,
+        };
+        task.fit(start).map_err(|reason| StageError::Joint(reason.into()))
+    }
+
+    /// From the poses alone.
+    fn first(&self) -> Start<State> {
+        let Prepared { shared, targets, usable, .. } = self.prepared;
+        Start { shared: shared.clone(), targets: targets.clone(), usable: usable.clone() }
+    }
+
+    /// From another fit, with all corners again.
+    fn again(&self, fit: &Fit<State>) -> Start<State> {
+        let mut shared = fit.shared.clone();
+        shared.state.returns.resize(self.poses, Isometry3::identity());
+        Start { shared, targets: fit.targets.clone(), usable: self.prepared.usable.clone() }
+    }
 }

@@ -1,10 +1,11 @@
 //! The mechanism at the stage poses of a calibration, and its prior.
 
 use nalgebra::{Isometry3, Matrix6xX};
-use vergence_rig::Screw;
+use vergence_rig::{Repeatability, Screw};
+use vergence_vision::{Angle, Length};
 
 use crate::extrinsics::Kinematics;
-use crate::reprojection::POSE;
+use crate::reprojection::{POSE, difference};
 use crate::schur_lm::Equations;
 use crate::stage::Tolerance;
 use crate::stage::mechanism::{State, direction};
@@ -12,6 +13,7 @@ use crate::stage::twist::across;
 use crate::stage::unknowns::{Ordinal, Unknown};
 
 /// Constants of the fit: drawing, readings, priors.
+#[derive(Clone)]
 pub(crate) struct Model {
     pub nominal: State,
     pub unknowns: Vec<Unknown>,
@@ -19,6 +21,8 @@ pub(crate) struct Model {
     pub readings: Vec<Vec<f64>>,
     /// Standard deviation of a reading of each axis.
     pub reading_sigma: Vec<f64>,
+    /// Standard deviation of each component of a return to a stage pose, in radians and millimetres; `None` where returns are no unknowns.
+    pub return_sigma: Option<[f64; 2]>,
     /// The stage pose of each view.
     pub pose_of_view: Vec<usize>,
     pub tolerance: Option<Tolerance>,
@@ -31,6 +35,20 @@ impl Model {
             return Vec::new();
         };
         readings.iter().zip(errors).map(|(reading, error)| reading + error).collect()
+    }
+
+    /// The same stage with returns to its poses that are off by these standard deviations.
+    pub fn with_returns(&self, return_sigma: [f64; 2]) -> Self {
+        let is_other = |unknown: &Unknown| !matches!(unknown, Unknown::Return { .. });
+        let mut unknowns: Vec<Unknown> = self.unknowns.iter().copied().filter(is_other).collect();
+        unknowns.extend((0..self.readings.len()).flat_map(|pose| [Unknown::Return { pose }; POSE]));
+        Self { unknowns, return_sigma: Some(return_sigma), ..self.clone() }
+    }
+
+    /// How well the stage returns to its poses, where that is unknown.
+    pub fn repeatability(&self) -> Option<Repeatability> {
+        let [rotation, translation] = self.return_sigma?;
+        Some(Repeatability { rotation: Angle::from_rad(rotation), translation: Length::from_mm(translation) })
     }
 
     fn pose(&self, view: usize) -> usize {
@@ -69,6 +87,13 @@ impl Model {
                 let sigma = *self.reading_sigma.get(axis)?;
                 Some((state.reading_errors.get(pose)?.get(axis)? / sigma, [1.0 / sigma, 0.0]))
             }
+            (Unknown::Return { pose }, _) => {
+                let sigma = self.return_sigma?[nth / 3 % 2];
+                let away = difference(state.returns.get(pose)?, &Isometry3::identity());
+                // Of two neighbours, it is the first or the second.
+                let by = if nth.is_multiple_of(2) { [1.0 / sigma, 0.0] } else { [0.0, 1.0 / sigma] };
+                Some((away[nth % POSE] / sigma, by))
+            }
             _ => None,
         }
     }
@@ -86,7 +111,8 @@ impl Kinematics for Model {
     }
 
     fn left_from_right(&self, state: &State, view: usize) -> Isometry3<f64> {
-        state.left_from_right(&self.corrected(state, self.pose(view)))
+        let pose = self.pose(view);
+        state.left_from_right(&self.corrected(state, pose)) * state.returned(Some(pose))
     }
 
     fn derivative(&self, state: &State, view: usize) -> Matrix6xX<f64> {
@@ -117,7 +143,6 @@ mod tests {
     use vergence_vision::Point;
 
     use super::*;
-    use crate::reprojection::difference;
     use crate::stage::{StageOptions, StagePose, start};
 
     fn model() -> Model {
@@ -142,7 +167,10 @@ mod tests {
             vergence_rig::AxisPosition::Linear(vergence_vision::Length::from_mm(145.0)),
             vergence_rig::AxisPosition::Rotary(vergence_vision::Angle::from_deg(100.0)),
         ];
-        start::model(&rig, &[StagePose { readings, views: Vec::new() }], &StageOptions::default()).unwrap()
+        let model = start::model(&rig, &[StagePose { readings, views: Vec::new() }], &StageOptions::default()).unwrap();
+        let mut model = model.with_returns([0.01, 2.0]);
+        model.nominal.returns.push(Isometry3::identity());
+        model
     }
 
     /// By central differences, from a point away from the drawing.
@@ -184,7 +212,13 @@ mod tests {
                 step[first + neighbour] = 1e-6;
                 let (moved, _) = model.deviation(&model.plus(&state, &step), unknown, nth).unwrap();
                 let error = (moved - deviation) / 1e-6 - derivative;
-                assert!(error.abs() < 1e-3 * (1.0 + derivative.abs()), "{unknown:?} {nth} {neighbour}: {error}");
+                // Returns are small: their derivative is that at none.
+                let returns =
+                    if matches!(unknown, Unknown::Return { .. }) { 1e-2 * by[0].abs().max(by[1].abs()) } else { 0.0 };
+                assert!(
+                    error.abs() < 1e-3 * (1.0 + derivative.abs()) + returns,
+                    "{unknown:?} {nth} {neighbour}: {error}"
+                );
             }
         }
     }

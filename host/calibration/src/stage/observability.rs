@@ -111,7 +111,7 @@ fn unit(unknown: Unknown, tolerance: Option<Tolerance>) -> f64 {
         Unknown::Line { .. } => tolerance.position.mm(),
         Unknown::Rotation => AT_ZERO.0,
         Unknown::Position => AT_ZERO.1,
-        Unknown::Scale { .. } | Unknown::Reading { .. } => tolerance.scale,
+        Unknown::Scale { .. } | Unknown::Reading { .. } | Unknown::Return { .. } => tolerance.scale,
     }
 }
 

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 use vergence_rig::{
-    AxisPosition, CalibratedNumbers, Chain, InvalidCovariance, Link, Rig, RigAxis, RigCalibration, RigNumber, Screw,
+    AxisPosition, CalibratedNumbers, Chain, InvalidCovariance, Link, Repeatability, Rig, RigAxis, RigCalibration,
+    RigNumber, Screw,
 };
 use vergence_vision::{
     Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Right, SHARED_PARAMETERS, SharedCovariance, Transform,
@@ -35,6 +36,8 @@ pub struct StageCalibration {
     pub scales: Vec<EncoderScale>,
     /// The base extrinsics: the relative pose where all encoders read zero.
     pub at_zero: PredictedPose,
+    /// How far the right camera returns beside where the mechanism puts it, where the stage poses show it.
+    pub repeatability: Option<Repeatability>,
     /// Figures of each stage pose.
     pub poses: Vec<StagePoseFigures>,
     /// The unknowns that the stage poses determine.
@@ -144,7 +147,9 @@ impl StageCalibration {
     #[must_use]
     pub fn predict(&self, readings: &[AxisPosition]) -> PredictedPose {
         let values: Vec<f64> = readings.iter().map(|reading| reading.value()).collect();
-        predict(&self.state, &self.mechanism, &self.of_mechanism(), &self.reading_sigma, &values)
+        let mut pose = predict(&self.state, &self.mechanism, &self.of_mechanism(), &self.reading_sigma, &values);
+        pose.covariance += self.of_return();
+        pose
     }
 
     /// Covariance that all points of a pair share at the encoder readings `readings`: lenses and pose with their
@@ -167,7 +172,7 @@ impl StageCalibration {
         ));
         let mut total = &by_unknowns * &self.covariance * by_unknowns.transpose();
         let mut of_pose = total.view_mut((pose, pose), (POSE, POSE));
-        of_pose += of_readings(&self.state, &self.reading_sigma, &values);
+        of_pose += of_readings(&self.state, &self.reading_sigma, &values) + self.of_return();
         SharedCovariance::joint(SMatrix::from_fn(|row, column| total[(row, column)]))
     }
 
@@ -202,6 +207,7 @@ impl StageCalibration {
             // A covariance of the solver is one: only rounding could refuse it, and then nothing is known.
             calibration: self.numbers().map_or(RigCalibration::Unknown, RigCalibration::Covariance),
             axes: drawn.axes.iter().enumerate().map(|(index, axis)| self.calibrated(index, axis)).collect(),
+            repeatability: self.repeatability.or(drawn.repeatability),
             ..drawn.clone()
         }
     }
@@ -216,6 +222,11 @@ impl StageCalibration {
                 .then(|| (axis.name.clone(), AxisPosition::from_value(axis.kind, play)))
         };
         self.axes.iter().zip(&self.reading_sigma).filter_map(play).collect()
+    }
+
+    /// The pose's covariance by how far the stage returns beside it.
+    fn of_return(&self) -> Matrix6<f64> {
+        self.repeatability.map_or_else(Matrix6::zeros, |found| found.covariance())
     }
 
     /// The axis with its play, calibrated between the lowest and the highest reading of all stage poses.
@@ -324,6 +335,7 @@ pub(crate) fn calibration(material: Material<'_>) -> Result<StageCalibration, St
         zero_offsets: zero_offsets(rig, &model.nominal, state, &mechanism, &of_mechanism),
         scales: scales.collect(),
         at_zero: predict(state, &mechanism, &of_mechanism, &model.reading_sigma, &vec![0.0; rig.axes.len()]),
+        repeatability: model.repeatability(),
         poses: pose_figures(rig, &model, &fit, alone),
         observability,
         view_scatter: *scatter,

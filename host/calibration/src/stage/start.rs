@@ -38,6 +38,7 @@ pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> R
         right_at_zero: *rig.right_chain.at_zero().isometry(),
         scales: vec![1.0; axes.len()],
         reading_errors: vec![vec![0.0; axes.len()]; poses.len()],
+        returns: Vec::new(),
     };
     // While the stage poses are fitted as such, the views of the mechanism are they.
     let pose_of_view = (0..poses.len()).collect();
@@ -46,6 +47,7 @@ pub(crate) fn model(rig: &Rig, poses: &[StagePose], options: &StageOptions) -> R
         nominal,
         readings: poses.iter().map(|pose| pose.readings.iter().map(|reading| reading.value()).collect()).collect(),
         reading_sigma,
+        return_sigma: None,
         pose_of_view,
         tolerance: options.tolerance,
     })

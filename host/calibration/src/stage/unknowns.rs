@@ -17,12 +17,14 @@ pub(crate) enum Unknown {
     Scale { axis: usize },
     /// Error of an encoder's reading at one stage pose.
     Reading { pose: usize, axis: usize },
+    /// A component of how far the right camera is from where the mechanism puts it at one stage pose: first the turn, then the shift.
+    Return { pose: usize },
 }
 
 impl Unknown {
-    /// Whether it is one of the mechanism, not of one reading.
+    /// Whether it is one of the mechanism, not of one stage pose.
     pub fn is_mechanical(self) -> bool {
-        !matches!(self, Self::Reading { .. })
+        !matches!(self, Self::Reading { .. } | Self::Return { .. })
     }
 
     /// Description of the unknown; `names` are those of the axes.
@@ -35,6 +37,7 @@ impl Unknown {
             Self::Position => "position of the right camera at zero".to_owned(),
             Self::Scale { axis } => format!("encoder scale of '{}'", name(axis)),
             Self::Reading { axis, .. } => format!("reading of '{}'", name(axis)),
+            Self::Return { .. } => "return to a stage pose".to_owned(),
         }
     }
 }

@@ -19,6 +19,9 @@ pub struct Bench {
     pub lenses: [KannalaBrandt; 2],
     /// Whether the encoders read in steps; without, they read exactly.
     pub steps: bool,
+    /// How far the right camera returns to a pose beside where the screws put it: standard deviation of each component, in radians and
+    /// millimetres. `None`: exactly.
+    pub returns: Option<[f64; 2]>,
 }
 
 impl Bench {
@@ -38,6 +41,7 @@ impl Bench {
             lenses,
             drawn,
             steps: true,
+            returns: None,
         }
     }
 
@@ -59,6 +63,14 @@ impl Bench {
         self.left.base_from_camera(&values).inverse() * self.right.base_from_camera(&values)
     }
 
+    /// Where the right camera comes to stand at `readings`.
+    pub fn returned(&self, readings: &[f64; 2], dice: &mut Dice) -> Transform<Left, Right> {
+        let there = self.left_from_right(readings);
+        let Some(returns) = self.returns else { return there };
+        let [turn, shift] = returns.map(|sigma| dice.vector(sigma));
+        Transform::new(UnitQuaternion::from_scaled_axis(turn) * there.rotation(), there.origin().mm() + shift)
+    }
+
     /// What the encoders say.
     pub fn read(&self, readings: &[f64; 2]) -> Vec<AxisPosition> {
         let read = self.drawn.axes.iter().zip(readings).map(|(axis, &reading)| {
@@ -71,7 +83,7 @@ impl Bench {
     pub fn pose(&self, readings: [f64; 2], views: usize, noise_px: f64, dice: &mut Dice) -> StagePose {
         // The stage stops near where it was sent, not on the edge of an encoder's step.
         let readings = [readings[0] + 0.01 * dice.normal(), readings[1] + 1e-3 * dice.normal()];
-        let left_from_right = self.left_from_right(&readings);
+        let left_from_right = self.returned(&readings, dice);
         let pair = Pair { left: self.lenses[0], right: self.lenses[1], left_from_right, noise_px };
         StagePose { readings: self.read(&readings), views: pair.views(views, dice) }
     }

@@ -6,13 +6,14 @@ use vergence_vision::{Angle, Length};
 
 use super::{CalibratedNumbers, InvalidCovariance, RigCalibration, RigNumber};
 use crate::file::RigError;
+use crate::repeatability::Repeatability;
 use crate::rig::Rig;
 use crate::text::quantity;
 
 /// The version that this program writes, and the latest that it reads.
 const VERSION: u32 = 1;
 
-/// Standard deviations of the calibrated pose.
+/// Standard deviations of each component of the relative pose.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SigmaFile {
@@ -35,13 +36,23 @@ pub(crate) struct CalibrationTables {
 
 impl SigmaFile {
     pub(crate) fn calibration(&self) -> Result<RigCalibration, RigError> {
+        let (rotation, translation) = self.checked("calibration_sigma")?;
+        Ok(RigCalibration::Sigmas { rotation, translation })
+    }
+
+    pub(crate) fn repeatability(&self) -> Result<Repeatability, RigError> {
+        let (rotation, translation) = self.checked("repeatability")?;
+        Ok(Repeatability { rotation, translation })
+    }
+
+    fn checked(&self, table: &str) -> Result<(Angle, Length), RigError> {
         let (rotation, translation) = (self.rotation, self.translation);
         if rotation.rad() < 0.0 || translation.mm() < 0.0 {
             return Err(contradiction(format!(
-                "[calibration_sigma] has rotation {rotation} and translation {translation}: a standard deviation cannot be negative"
+                "[{table}] has rotation {rotation} and translation {translation}: a standard deviation cannot be negative"
             )));
         }
-        Ok(RigCalibration::Sigmas { rotation, translation })
+        Ok((rotation, translation))
     }
 }
 
