@@ -57,9 +57,18 @@ impl Trajectory {
     }
 
     /// The quickest motion from `from` to rest at `target` that takes at least `at_least` seconds. A motion that cannot take
-    /// exactly that long takes longer.
+    /// exactly that long takes longer; one that creeps over a few micro-units, whose time single precision does not tell, rests at its end.
     #[must_use]
     pub fn reach(from: MotionState, target: Fine, limits: Limits, at_least: f32) -> Self {
+        let mut whole = Self::moving(from, target, limits, at_least);
+        if whole.duration() > 0.0 {
+            whole.rest_until(at_least);
+        }
+        whole
+    }
+
+    /// As [`Self::reach`], but the motion alone.
+    fn moving(from: MotionState, target: Fine, limits: Limits, at_least: f32) -> Self {
         if from.is_rest() {
             return Self::from_rest(from.position, target, limits, at_least);
         }

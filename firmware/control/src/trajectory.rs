@@ -130,7 +130,7 @@ impl Trajectory {
         }
     }
 
-    /// Adds a motion that begins where this one ends.
+    /// Adds a motion that begins where this one ends. Rest at the end of this one comes after it.
     pub(crate) fn append(&mut self, next: &Self) {
         next.segments.iter().for_each(|&segment| self.push(segment));
         self.target = next.target;

@@ -285,3 +285,16 @@ fn a_long_way_takes_distance_by_speed_and_one_speed_change() {
     let trajectory = Trajectory::reach(MotionState::at(0), fine(85_000.0), limits, 0.0);
     assert!((trajectory.duration() - 1.3125).abs() < 1e-5, "{}", trajectory.duration());
 }
+
+/// Found by a law with another seed: an axis that brakes to a few micro-units before its target, and creeps over them for half a minute, was
+/// there a fifth sooner than asked for.
+#[test]
+fn a_creeping_axis_is_not_there_before_the_others() {
+    let limits = Limits { speed: 127_281.09, acceleration: 26_223.906, jerk: 186_598_820.0 };
+    let from = MotionState { position: -3_202_108_624_625, velocity: 2_135_415_284_960, acceleration: 0 };
+    let target = fine(118_052.0);
+    let quickest = Trajectory::reach(from, target, limits, 0.0).duration();
+    let slower = Trajectory::reach(from, target, limits, quickest * 7.94594);
+    assert!(slower.duration() >= quickest * 7.94594 * (1.0 - 1e-4), "{} s", slower.duration());
+    assert_eq!(slower.state(slower.ends()), MotionState::at(target));
+}
