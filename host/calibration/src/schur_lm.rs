@@ -7,6 +7,7 @@
 //! Problems", 2004, section 3.2.
 
 mod clustered;
+mod nearby;
 mod normal;
 mod products;
 
@@ -195,9 +196,7 @@ pub fn linearise<const B: usize, P: SchurProblem<B>>(
     loss: Loss,
 ) -> SchurNormal<B> {
     let n = problem.shared_dimension();
-    let mut common = Equations::new(n, loss);
-    problem.shared_residuals(shared, &mut common);
-    let common = common.summed();
+    let common = common(problem, shared, loss);
     let parts: Vec<_> = blocks
         .par_iter()
         .enumerate()
@@ -207,13 +206,20 @@ pub fn linearise<const B: usize, P: SchurProblem<B>>(
             equations.summed()
         })
         .collect();
-    SchurNormal::from_parts(n, &common, &parts)
+    SchurNormal::from_equations(n, &common, &parts)
+}
+
+/// The residuals that depend on no small block.
+pub(crate) fn common<const B: usize, P: SchurProblem<B>>(problem: &P, shared: &P::Shared, loss: Loss) -> Equations<B> {
+    let mut common = Equations::new(problem.shared_dimension(), loss);
+    problem.shared_residuals(shared, &mut common);
+    common.summed()
 }
 
 /// A step in all local coordinates.
 pub(crate) struct Step<const B: usize> {
-    shared: DVector<f64>,
-    blocks: Vec<SVector<f64, B>>,
+    pub shared: DVector<f64>,
+    pub blocks: Vec<SVector<f64, B>>,
     /// The decrease of the cost that the linear model promises.
-    predicted: f64,
+    pub predicted: f64,
 }

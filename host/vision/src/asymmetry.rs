@@ -12,6 +12,7 @@
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
+use crate::lens_derivatives::inverse;
 use crate::{InvalidLens, KannalaBrandt, Pixel};
 
 /// Number of coefficients of an [`Asymmetry`].
@@ -79,15 +80,17 @@ impl Asymmetry {
     #[must_use]
     pub fn place_of(&self, moved: Vector2<f64>) -> Option<Vector2<f64>> {
         const STEPS: usize = 30;
+        /// What a shorter step leaves, about its square, is below rounding.
+        const SHORT: f64 = 1e-9;
         let mut m = moved;
         for _ in 0..STEPS {
             let by_place = self.by_place(m);
             if by_place.determinant().is_nan() || by_place.determinant() <= 0.0 {
                 return None;
             }
-            let step = by_place.try_inverse()? * (moved - self.moved(m));
+            let step = inverse(&by_place) * (moved - self.moved(m));
             m += step;
-            if step.norm() <= 4.0 * f64::EPSILON * (1.0 + m.norm()) {
+            if step.norm_squared() <= SHORT * SHORT {
                 return Some(m);
             }
         }

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use crate::covariance::range_sigma;
 use crate::epipolar::ray_to_plane;
-use crate::triangulation::Triangulated;
+use crate::triangulation::{Triangulated, require};
 use crate::uncertainty::{PointUncertainty, ResidualUncertainty};
 use crate::{Angle, DropReason, Gates, Left, Length, MatchSigma, PixelPair, Point, Right, StereoPair};
 
@@ -118,9 +118,4 @@ pub fn cloud_point(
         residual_sigma,
         extrapolated: !(rig.left.is_measured(&left) && rig.right.is_measured(&in_right)),
     })
-}
-
-/// Takes the condition that must hold, so that a comparison with NaN drops the match.
-fn require(holds: bool, otherwise: DropReason) -> Result<(), DropReason> {
-    if holds { Ok(()) } else { Err(otherwise) }
 }

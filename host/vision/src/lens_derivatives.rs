@@ -50,6 +50,8 @@ struct Local {
 
 /// What changes with a ray, its pixel and its lens.
 pub(crate) struct RayDerivatives {
+    /// Where the ray starts, in mm.
+    pub origin: Vector3<f64>,
     /// As [`KannalaBrandt::ray_by_pixel`].
     pub ray_by_pixel: Matrix3x2<f64>,
     /// As [`KannalaBrandt::pixel_by_lens`].
@@ -102,11 +104,14 @@ impl KannalaBrandt {
     /// All derivatives at `ray`, at little more than the cost of one.
     pub(crate) fn derivatives<F: Frame>(&self, ray: &UnitRay<F>) -> RayDerivatives {
         let local = self.local(ray);
+        let origin_by_pupil = Pupil::by_coefficients(Angle::from_rad(local.theta));
+        let [e0, e1] = self.pupil().mm();
         RayDerivatives {
+            origin: Vector3::z() * (e0 * origin_by_pupil[0] + e1 * origin_by_pupil[1]),
             ray_by_pixel: self.foreign_ray_by_pixel(ray).unwrap_or_else(|| local.ray_by_pixel(self)),
             pixel_by_lens: local.pixel_by_lens(self),
             origin_by_ray: local.space[0].transpose() * self.pupil().slope_mm(local.theta),
-            origin_by_pupil: Pupil::by_coefficients(Angle::from_rad(local.theta)),
+            origin_by_pupil,
         }
     }
 
@@ -147,7 +152,7 @@ impl Local {
 }
 
 /// The inverse of a matrix; infinite or not numbers where it has none.
-fn inverse(matrix: &Matrix2<f64>) -> Matrix2<f64> {
+pub(crate) fn inverse(matrix: &Matrix2<f64>) -> Matrix2<f64> {
     Matrix2::new(matrix.m22, -matrix.m12, -matrix.m21, matrix.m11) / matrix.determinant()
 }
 

@@ -41,11 +41,18 @@ pub fn pupil_shift_by_sine(theta: f64, sine: f64) -> f64 {
 #[must_use]
 pub fn pupil_shift_slope(theta: f64) -> f64 {
     let (sine, cosine) = theta.sin_cos();
+    shifts(theta, sine, cosine)[1]
+}
+
+/// [`pupil_shift`] and its first and second derivative.
+fn shifts(theta: f64, sine: f64, cosine: f64) -> [f64; 3] {
+    let (squared, over) = (theta * theta, 1.0 / sine);
     if theta < PARAXIAL {
-        theta * (1.0 / 3.0 + theta * theta * 7.0 / 90.0)
-    } else {
-        (sine - theta * cosine) / (sine * sine)
+        let slope = theta * (1.0 / 3.0 + squared * 7.0 / 90.0);
+        return [squared * (1.0 / 6.0 + squared * 7.0 / 360.0), slope, 1.0 / 3.0 + squared * 7.0 / 30.0];
     }
+    let (ratio, slope) = (theta * over, (sine - theta * cosine) * (over * over));
+    [ratio - 1.0, slope, ratio - 2.0 * cosine * slope * over]
 }
 
 /// How the pupil of a lens moves along the axis with the angle of the ray. The default stays at the origin: a central lens.
@@ -113,39 +120,36 @@ impl Pupil {
     /// `None` for a point at the origin, and for one nearer to its pupil than e' sin θ.
     #[must_use]
     pub fn seen(&self, rho: f64, z: f64) -> Option<SeenPoint> {
-        /// From 50 mm three steps suffice.
         const STEPS: usize = 20;
-        /// What Newton's method leaves of a shorter step is far below the rounding error of the angle.
-        const SHORT: f64 = 1e-9;
-        let range = rho.hypot(z);
+        /// What a shorter step leaves, about its cube, is far below the rounding error of the angle.
+        const SHORT: f64 = 1e-5;
+        let range = (rho * rho + z * z).sqrt();
         let mut seen = SeenPoint { theta: rho.atan2(z), sine: rho / range, cosine: z / range, slope: 0.0 };
         for _ in 0..STEPS {
-            let off = self.off(&mut seen, rho, z)?;
-            seen.turn_to((seen.theta + off / seen.slope).clamp(0.0, 3.1));
-            if off.abs() <= SHORT * seen.slope {
-                break;
+            let [off, bend] = self.off(&mut seen, rho, z)?;
+            let newton = off / seen.slope;
+            // The root of the parabola, to second order; farther away it need not be nearer.
+            let longer = (0.5 * bend * newton / seen.slope).clamp(-0.5, 0.5);
+            seen.turn_to((seen.theta + newton * (1.0 + longer)).clamp(0.0, 3.1));
+            if newton.abs() <= SHORT {
+                seen.slope -= bend * newton;
+                return (seen.slope > 0.0).then_some(seen);
             }
         }
-        self.off(&mut seen, rho, z)?;
-        Some(seen)
+        self.off(&mut seen, rho, z).map(|_| seen)
     }
 
-    /// F of the module's head, and its slope -dF/dθ in `seen`, which is D where F is zero; `None` where there is no way to zero.
-    fn off(&self, seen: &mut SeenPoint, rho: f64, z: f64) -> Option<f64> {
-        let [shift, growth] = self.at(seen);
-        let ahead = z - shift;
-        seen.slope = rho * seen.sine + ahead * seen.cosine - growth * seen.sine;
-        (seen.slope > 0.0).then_some(rho * seen.cosine - ahead * seen.sine)
-    }
-
-    /// e(θ) and de/dθ in millimetres.
-    fn at(&self, SeenPoint { theta, sine, cosine, .. }: &SeenPoint) -> [f64; 2] {
-        let [e0, e1] = self.mm();
-        let shift = pupil_shift_by_sine(*theta, *sine);
-        let is_paraxial = *theta < PARAXIAL;
-        let slope = if is_paraxial { pupil_shift_slope(*theta) } else { (sine - theta * cosine) / (sine * sine) };
-        let growth = e0 + e1 * (theta * theta);
-        [growth * shift, growth * slope + 2.0 * e1 * theta * shift]
+    /// F of the module's head and its second derivative, and its slope -dF/dθ in `seen`, which is D where F is zero; `None` where there is no way
+    /// to zero.
+    fn off(&self, seen: &mut SeenPoint, rho: f64, z: f64) -> Option<[f64; 2]> {
+        let ([e0, e1], SeenPoint { theta, sine, cosine, .. }) = (self.mm(), *seen);
+        let [shift, slope, bend] = shifts(theta, sine, cosine);
+        let (growth, more) = (e0 + e1 * theta * theta, 2.0 * e1);
+        let bend = growth * bend + more * (2.0 * theta * slope + shift);
+        let (ahead, slope) = (z - growth * shift, growth * slope + more * theta * shift);
+        seen.slope = rho * sine + ahead * cosine - slope * sine;
+        let off = rho * cosine - ahead * sine;
+        (seen.slope > 0.0).then_some([off, 2.0 * slope * cosine + bend * sine - off])
     }
 }
 
@@ -164,8 +168,8 @@ pub struct SeenPoint {
 
 impl SeenPoint {
     fn turn_to(&mut self, theta: f64) {
-        /// By less, the first terms of the series are exact.
-        const SMALL: f64 = 1e-3;
+        /// By less, the first terms of the series are exact: by so much a point at 60 mm is off by a pupil that moves by 3 mm.
+        const SMALL: f64 = 0.05;
         let by = theta - self.theta;
         self.theta = theta;
         if by.abs() > SMALL {
@@ -173,7 +177,8 @@ impl SeenPoint {
             return;
         }
         let square = by * by;
-        let (sin, versine) = (by * (1.0 - square / 6.0), square * (0.5 - square / 24.0));
+        let sin = by * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)));
+        let versine = square * (0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0)));
         (self.sine, self.cosine) = (
             self.sine + (self.cosine * sin - self.sine * versine),
             self.cosine - (self.sine * sin + self.cosine * versine),

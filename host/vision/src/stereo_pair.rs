@@ -1,5 +1,7 @@
 //! Stereo pairs, and matches between their images.
 
+use nalgebra::Vector3;
+
 use crate::{KannalaBrandt, Left, Pixel, Point, Right, Transform, UnitRay};
 
 /// A match: the pixels where both images show the same scene point.
@@ -35,12 +37,16 @@ impl<'a> StereoPair<'a> {
     /// Central lenses leave the pair as it is. In general the right centre moves from t to t + R o_right - o_left.
     #[must_use]
     pub fn at_origins(&self, left: &UnitRay<Left>, right: &UnitRay<Right>) -> (StereoPair<'a>, Point<Left>) {
-        let left_origin = self.left.origin_of(left);
+        let [left, right] = [self.left.origin_of(left).mm(), self.right.origin_of(right).mm()];
+        (self.between(left, right), Point::from_mm(left))
+    }
+
+    /// The pair between two points, in millimetres, each in its own camera's frame.
+    pub(crate) fn between(&self, left: Vector3<f64>, right: Vector3<f64>) -> StereoPair<'a> {
         if self.is_central() {
-            return (*self, left_origin);
+            return *self;
         }
-        let rotation = self.left_from_right.rotation();
-        let centre = (self.left_from_right * self.right.origin_of(right)).mm() - left_origin.mm();
-        (StereoPair { left_from_right: Transform::new(rotation, centre), ..*self }, left_origin)
+        let centre = (self.left_from_right * Point::from_mm(right)).mm() - left;
+        StereoPair { left_from_right: Transform::new(self.left_from_right.rotation(), centre), ..*self }
     }
 }

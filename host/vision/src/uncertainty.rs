@@ -75,17 +75,17 @@ impl PointUncertainty {
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
         let (left, in_right) =
             (pair.left.ray_to(point)?, pair.right.ray_to(&(pair.left_from_right.inverse() * *point))?);
-        let (between, origin) = pair.at_origins(&left, &in_right);
-        let (seen, centre) = (point.mm() - origin.mm(), between.left_from_right.origin().mm());
+        let (at_left, at_right) = (pair.left.derivatives(&left), pair.right.derivatives(&in_right));
+        let between = pair.between(at_left.origin, at_right.origin);
+        let (seen, centre) = (point.mm() - at_left.origin, between.left_from_right.origin().mm());
         let (mut by_left, mut by_right) = by_rays(&seen, &centre, edge)?;
         let by_shift = by_right / (seen - centre).norm();
         let right = turn * in_right.vector();
-        let right_origin = turn * pair.right.origin_of(&in_right).mm();
+        let right_origin = turn * at_right.origin;
         let by_turn = -by_right * right.cross_matrix() - by_shift * right_origin.cross_matrix();
         by_right *= turn;
         let by_left_origin = (Matrix3::identity() - by_shift).column(2).into_owned();
         let by_right_origin = by_shift * turn.column(2);
-        let (at_left, at_right) = (pair.left.derivatives(&left), pair.right.derivatives(&in_right));
         by_left += by_left_origin * at_left.origin_by_ray;
         by_right += by_right_origin * at_right.origin_by_ray;
 
@@ -152,11 +152,11 @@ impl ResidualUncertainty {
     ) -> Option<Self> {
         let sigma = sigma.into();
         let turn = pair.left_from_right.rotation().to_rotation_matrix().into_inner();
-        let centre = pair.at_origins(left, right).0.left_from_right.origin();
+        let (at_left, at_right) = (pair.left.derivatives(left), pair.right.derivatives(right));
+        let centre = pair.between(at_left.origin, at_right.origin).left_from_right.origin();
         let (u, v, t) = (left.vector(), turn * right.vector(), centre.direction()?.vector());
         let (from_u, from_v) = (t.cross(&u), t.cross(&v));
         let sine = from_u.norm().max(from_v.norm());
-        let (at_left, at_right) = (pair.left.derivatives(left), pair.right.derivatives(right));
         // A shift along the baseline does not change the angle.
         let across = u.cross(&v) / (sine * centre.mm().norm());
         let by_shift = (across - t * t.dot(&across)).transpose();
@@ -166,7 +166,7 @@ impl ResidualUncertainty {
         let (by_left, by_right) = (by_left_ray * at_left.ray_by_pixel, by_right_ray * at_right.ray_by_pixel);
         let left_noise = by_left_ray * sigma.of_ray(&at_left.ray_by_pixel, &left.vector(), &t);
         let right_noise = by_right_ray * sigma.of_ray(&at_right.ray_by_pixel, &right.vector(), &(turn.transpose() * t));
-        let right_origin = turn * pair.right.origin_of(right).mm();
+        let right_origin = turn * at_right.origin;
         let by_turn = v.cross(&(from_u / sine)).transpose() - by_shift * right_origin.cross_matrix();
 
         let mut by_shared = RowSVector::<f64, SHARED_PARAMETERS>::zeros();

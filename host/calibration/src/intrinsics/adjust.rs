@@ -7,7 +7,7 @@ use vergence_vision::median;
 use super::bundle::{Bundle, SHARED, Shared};
 use super::lens::{CENTRAL, E0, E1, LENS, LensParameters};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
-use super::prior::{FINEST, Prior};
+use super::prior::{FINEST, Prior, Strength};
 use super::start::Start;
 use super::{IntrinsicsError, IntrinsicsOptions, Outlier, OutlierReason};
 use crate::Loss;
@@ -32,6 +32,8 @@ pub(super) struct Adjusted {
     pub free: Vec<usize>,
     /// Over the parameters adjusted and the poses.
     pub normal: SchurNormal<POSE>,
+    /// How strongly the prior counts.
+    pub strength: Option<Strength>,
     /// Variance by which the prior was weighted, over that of the residuals.
     pub prior_factor: f64,
     pub outliers: Vec<Outlier>,
@@ -132,7 +134,7 @@ fn of_corners<'a>(
 
 /// Median deviation over all corners.
 fn scale(views: &[ObservedView], state: &State) -> Option<f64> {
-    Some(median(of_corners(views, state, Shared::deviation).collect())?.max(FINEST)).filter(|scale| scale.is_finite())
+    Some(median(deviations(views, state))?.max(FINEST)).filter(|scale| scale.is_finite())
 }
 
 /// Gives each target the mirrored tilt if that fits better: it is another local optimum of a plane's pose (D.
@@ -170,18 +172,12 @@ fn mirrored(pose: &Isometry3<f64>, view: &ObservedView) -> Isometry3<f64> {
 }
 
 impl State {
-    /// With zero for what lens and target do not have with these terms.
-    pub fn with_only(mut self, terms: Terms) -> Self {
-        let free = terms.free();
-        if !terms.bow {
-            self.shared.warp_mm = [0.0; 2];
-        }
-        let mut lens = self.shared.lens.to_array();
-        lens.iter_mut()
-            .enumerate()
-            .filter(|(parameter, _)| !free.contains(parameter))
-            .for_each(|(_, value)| *value = 0.0);
-        self.shared.lens = LensParameters::from_array(lens);
+    /// With zero for what lens and target do not have where only these parameters are adjusted.
+    pub fn with_only(mut self, free: &[usize]) -> Self {
+        let mut values = self.shared.to_array();
+        (0..SHARED).filter(|parameter| !free.contains(parameter)).for_each(|parameter| values[parameter] = 0.0);
+        let [lens @ .., warp_x, warp_y] = values;
+        self.shared = Shared { lens: LensParameters::from_array(lens), warp_mm: [warp_x, warp_y] };
         self
     }
 }
@@ -199,6 +195,11 @@ impl Adjusted {
     }
 }
 
+/// Of fits that may be the result: their last steps are far below the standard deviations.
+pub(super) const EXACT: SchurOptions = SchurOptions { iterations: 200, ..SchurOptions::near() };
+/// Of fits that are judged, or from which others start: what is left of chi-squared is below a hundredth.
+pub(super) const NEAR: SchurOptions = SchurOptions { relative_cost: 1e-6, ..EXACT };
+
 /// Plain least squares over the corners near their reprojections, repeated until the set of corners stays the same. `free` are the
 /// parameters adjusted; `prior` is how what is known of lenses before any view weighs.
 pub(super) fn inlier_fit(
@@ -206,22 +207,25 @@ pub(super) fn inlier_fit(
     mut state: State,
     free: Vec<usize>,
     prior: Option<Prior>,
-    options: &IntrinsicsOptions,
+    (options, arrow): (&IntrinsicsOptions, &SchurOptions),
 ) -> Result<Adjusted, IntrinsicsError> {
     const ROUNDS: usize = 10;
     let mut left_out = Vec::new();
-    let mut normal = None;
+    let (mut normal, mut strength) = (None, None);
     for _ in 0..ROUNDS {
-        let changed = options.outlier_factor.is_some_and(|factor| flag(&mut views, &state, factor));
+        let deviations = deviations(&views, &state);
+        let changed = options.outlier_factor.is_some_and(|factor| flag(&mut views, &deviations, factor));
         if !changed && normal.is_some() {
             break;
         }
-        drop_views(&mut views, &mut state, &mut left_out)?;
+        let deviations = match drop_views(&mut views, &mut state, &mut left_out)? {
+            true => self::deviations(&views, &state),
+            false => deviations,
+        };
         let references: Vec<_> = views.iter().collect();
-        let arrow = SchurOptions { iterations: 200, ..SchurOptions::near() };
-        let strength = prior.and_then(|prior| prior.strength(&views, &state));
+        strength = prior.and_then(|prior| prior.strength(&views, &deviations));
         let problem = Bundle { prior: strength, ..Bundle::of(&references, &free) };
-        let solution = solve(&problem, state.shared, state.poses, &arrow);
+        let solution = solve(&problem, state.shared, state.poses, arrow);
         if matches!(solution.ending, Ending::Iterations | Ending::NotFinite) {
             return Err(IntrinsicsError::NotConverged);
         }
@@ -229,38 +233,47 @@ pub(super) fn inlier_fit(
         normal = Some(solution.normal);
     }
     let normal = normal.ok_or(IntrinsicsError::NotConverged)?;
-    let prior_factor = prior.map_or(1.0, Prior::factor);
-    Ok(Adjusted { shared: state.shared, views, poses: state.poses, free, normal, prior_factor, outliers: left_out })
+    let (prior_factor, State { shared, poses }) = (prior.map_or(1.0, Prior::factor), state);
+    Ok(Adjusted { shared, views, poses, free, normal, strength, prior_factor, outliers: left_out })
+}
+
+/// Deviations of all corners, in their order.
+pub(super) fn deviations(views: &[ObservedView], state: &State) -> Vec<f64> {
+    of_corners(views, state, Shared::deviation).collect()
+}
+
+/// Median deviation of the corners used.
+pub(super) fn median_of_used(views: &[ObservedView], deviations: &[f64]) -> Option<f64> {
+    let corners = views.iter().flat_map(|view| &view.observations).zip(deviations);
+    median(corners.filter(|(corner, _)| corner.used).map(|(_, deviation)| *deviation).collect())
 }
 
 /// Flags the corners to use: those within `factor` median deviations of the used ones. Returns whether any flag
 /// changed.
-fn flag(views: &mut [ObservedView], state: &State, factor: f64) -> bool {
-    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
-    let Some(median) = median(used.collect()) else { return false };
+fn flag(views: &mut [ObservedView], deviations: &[f64], factor: f64) -> bool {
+    let Some(median) = median_of_used(views, deviations) else { return false };
     let limit = factor * median.max(FINEST);
     let mut changed = false;
-    for (view, pose) in views.iter_mut().zip(&state.poses) {
-        for observation in &mut view.observations {
-            let used = state.shared.deviation(pose, observation) < limit;
-            changed |= used != observation.used;
-            observation.used = used;
-        }
+    for (corner, deviation) in views.iter_mut().flat_map(|view| &mut view.observations).zip(deviations) {
+        let used = *deviation < limit;
+        changed |= used != corner.used;
+        corner.used = used;
     }
     changed
 }
 
-/// Removes views with most corners unused: they contradict the lens.
+/// Removes views with most corners unused: they contradict the lens. Whether there were any.
 fn drop_views(
     views: &mut Vec<ObservedView>,
     state: &mut State,
     left_out: &mut Vec<Outlier>,
-) -> Result<(), IntrinsicsError> {
+) -> Result<bool, IntrinsicsError> {
     let agrees = |view: &ObservedView| {
         let used = view.used().count();
         used >= FEWEST_CORNERS && 2 * used > view.observations.len()
     };
-    let (mut kept, mut poses) = (Vec::with_capacity(views.len()), Vec::with_capacity(views.len()));
+    let given = views.len();
+    let (mut kept, mut poses) = (Vec::with_capacity(given), Vec::with_capacity(given));
     for (view, pose) in views.drain(..).zip(&state.poses) {
         if agrees(&view) {
             kept.push(view);
@@ -280,5 +293,5 @@ fn drop_views(
     if views.len() < FEWEST_VIEWS {
         return Err(IntrinsicsError::ViewsDisagree { views: views.len(), needed: FEWEST_VIEWS });
     }
-    Ok(())
+    Ok(views.len() < given)
 }

@@ -25,6 +25,12 @@ impl Shared {
         Self { lens: lens.into(), warp_mm: [0.0; 2] }
     }
 
+    /// The parameters, lens first.
+    pub fn to_array(self) -> [f64; SHARED] {
+        let (lens, [x, y]) = (self.lens.to_array(), self.warp_mm);
+        std::array::from_fn(|i| if i < LENS { lens[i] } else { [x, y][i - LENS] })
+    }
+
     /// Distance in pixels between `observation` and its reprojection; NaN where there is none.
     pub fn residual_px(&self, pose: &Isometry3<f64>, observation: &Observation) -> f64 {
         let point = pose * self.on_target(observation);
@@ -118,7 +124,7 @@ impl SchurProblem<POSE> for Bundle<'_> {
 
     fn shared_residuals(&self, shared: &Shared, equations: &mut Equations<POSE>) {
         let Some(strength) = self.prior else { return };
-        let values: Vec<f64> = shared.lens.to_array().into_iter().chain(shared.warp_mm).collect();
+        let values = shared.to_array();
         let place = |parameter: usize| self.free.iter().position(|&free| free == parameter);
         for (nth, Known { sum, sigma }) in KNOWN.iter().enumerate() {
             let mut columns = vec![[0.0]; self.free.len()];

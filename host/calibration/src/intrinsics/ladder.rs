@@ -15,15 +15,20 @@ use std::rc::Rc;
 
 use vergence_vision::ImageSize;
 
-use super::adjust::{Adjusted, State, Terms, inlier_fit};
+use super::adjust::{Adjusted, EXACT, NEAR, State, Terms, deviations, inlier_fit};
+use super::bundle::Bundle;
+use super::foretold::Linear;
 use super::lens::with_valid_cone;
 use super::mounting::mounting;
 use super::observations::ObservedView;
-use super::prior::{BOW, Prior, narrowest};
+use super::prior::{BOW, Prior, Strength, narrowest};
 use super::pupil;
 use super::report::outermost;
-use super::trial::{Trial, scatter};
+use super::trial::{TEN, Trial, scatter};
 use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
+use crate::Loss;
+use crate::reprojection::POSE;
+use crate::schur_lm::{SchurNormal, linearise};
 
 /// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of six unknowns
 /// chance gives it once in 25,000 calibrations.
@@ -85,7 +90,10 @@ pub(super) fn fit(
     size: ImageSize,
     options: &IntrinsicsOptions,
 ) -> Result<(Adjusted, Evidence), IntrinsicsError> {
-    let central = inlier_fit(views, state, Terms::central(options.warp).free(), None, options)?;
+    let is_start = options.model != LensModel::Central;
+    let central_fit =
+        |views, state, arrow| inlier_fit(views, state, Terms::central(options.warp).free(), None, (options, arrow));
+    let central = central_fit(views, state, if is_start { &NEAR } else { &EXACT })?;
     let (whole, pupil) = (Terms::whole(options.warp), Terms::pupil(options.warp));
     let candidates = match options.model {
         LensModel::Central => Vec::new(),
@@ -95,10 +103,14 @@ pub(super) fn fit(
     };
     // The richest lens may be one too many for a handful of corners.
     let richest = candidates.iter().find_map(|terms| Richest::of(&central, *terms, size, options));
-    match richest {
-        Some(richest) => richest.judged(central),
-        None => Ok((central, Evidence { pupil: PupilEvidence::NotAsked, steps: Vec::new() })),
-    }
+    let none = Evidence { pupil: PupilEvidence::NotAsked, steps: Vec::new() };
+    let (richer, evidence) = richest.map_or(Ok((None, none)), Richest::judged)?;
+    let adjusted = match richer {
+        Some(adjusted) => adjusted,
+        None if is_start => central_fit(central.views.clone(), central.state(), &EXACT)?.after(&central),
+        None => central,
+    };
+    Ok((adjusted, evidence))
 }
 
 /// The fit of the richest lens.
@@ -109,21 +121,52 @@ pub(super) struct Richest<'a> {
     /// Variance of a residual, as the views scatter with this lens.
     pub variance: f64,
     pub options: &'a IntrinsicsOptions,
+    before: Before,
+    /// Whether the fit with one centre used the same corners.
+    is_same: bool,
     /// The trials made.
     trials: RefCell<Vec<(Terms, Rc<Trial>)>>,
+}
+
+/// The equations of the richest lens where the one with one centre is: they foretell the lenses whose pupil does not move.
+struct Before {
+    state: State,
+    free: Vec<usize>,
+    normal: SchurNormal<POSE>,
+}
+
+impl Before {
+    fn of(central: &Adjusted, terms: Terms, prior: Option<Strength>) -> Self {
+        let (state, free) = (central.state(), terms.free());
+        let references: Vec<_> = central.views.iter().collect();
+        let problem = Bundle { prior, ..Bundle::of(&references, &free) };
+        let normal = linearise(&problem, &state.shared, &state.poses, Loss::Squares);
+        Self { state, free, normal }
+    }
+
+    fn linear(&self) -> Linear<'_> {
+        Linear { shared: &self.state.shared, poses: &self.state.poses, free: &self.free, normal: &self.normal }
+    }
 }
 
 impl<'a> Richest<'a> {
     /// `None` where the corners do not give one.
     fn of(central: &Adjusted, terms: Terms, size: ImageSize, options: &'a IntrinsicsOptions) -> Option<Self> {
         let rough = Prior { scatter: 1.0, mounting: 1.0 };
-        let first = Trial::of(central, terms, rough);
-        let prior = Prior { scatter: scatter(&first.normal, rough)?, ..rough };
-        let adjusted = inlier_fit(central.views.clone(), first.state, terms.free(), Some(prior), options);
+        let strength = rough.strength(&central.views, &deviations(&central.views, &central.state()));
+        let before = Before::of(central, terms, strength);
+        let first = Trial::fitted(central, &before.linear(), (terms, strength), TEN);
+        let prior = Prior { scatter: scatter(&first.normal)?, ..rough };
+        let start = first.linear().start(&central.views, terms, strength.map(|rough| rough.scaled(prior)));
+        // With decentring and thin prism it is never the result: that has a prior by how badly the lens is mounted.
+        let arrow = if terms.asymmetry { &NEAR } else { &EXACT };
+        let adjusted = inlier_fit(central.views.clone(), start, terms.free(), Some(prior), (options, arrow));
         let adjusted = adjusted.ok()?.after(central);
         with_valid_cone(adjusted.shared.lens, outermost(&adjusted), size).ok()?;
-        let variance = adjusted.normal.variance()? * scatter(&adjusted.normal, prior)?.powi(2);
-        (variance > 0.0).then_some(Self { adjusted, terms, prior, variance, options, trials: RefCell::default() })
+        let variance = adjusted.normal.variance()? * scatter(&adjusted.normal)?.powi(2);
+        let (is_same, trials) = (adjusted.uses_corners_of(central), RefCell::default());
+        let richest = Self { adjusted, terms, prior, variance, options, before, is_same, trials };
+        (variance > 0.0).then_some(richest)
     }
 
     /// The fit of a lens to the corners that this one used.
@@ -132,7 +175,9 @@ impl<'a> Richest<'a> {
         if let Some((_, trial)) = trials.iter().find(|(of, _)| *of == terms) {
             return Rc::clone(trial);
         }
-        let trial = Rc::new(Trial::of(&self.adjusted, terms, self.prior));
+        // A pupil that does not move any more leaves the poses of the targets far from where they were.
+        let from = if terms.e0 { (&self.adjusted.linear(), true) } else { (&self.before.linear(), self.is_same) };
+        let trial = Rc::new(Trial::of(&self.adjusted, from, terms));
         trials.push((terms, Rc::clone(&trial)));
         trial
     }
@@ -144,11 +189,15 @@ impl<'a> Richest<'a> {
 
     /// The residuals of views held out, without and with the parameters in question.
     pub fn held_out_px(&self, without: &Trial, with: &Trial) -> [f64; 2] {
-        [without, with].map(|lens| lens.held_out_px(&self.adjusted))
+        let foretold = [without, with].map(|lens| lens.foretold(&self.adjusted));
+        match foretold {
+            [Some(without), Some(with)] if without.is_told_from(&with) => [without.px, with.px],
+            _ => [without, with].map(|lens| lens.fitted_px(&self.adjusted)),
+        }
     }
 
-    /// The adjustment with the lens that is left, and the evidence.
-    fn judged(self, central: Adjusted) -> Result<(Adjusted, Evidence), IntrinsicsError> {
+    /// The adjustment with the lens that is left, unless that has one centre, and the evidence.
+    fn judged(self) -> Result<(Option<Adjusted>, Evidence), IntrinsicsError> {
         let pupil = pupil::evidence(&self);
         let has_pupil = !matches!(pupil, PupilEvidence::Central { .. });
         let (mut terms, mut steps) =
@@ -167,14 +216,15 @@ impl<'a> Richest<'a> {
             steps.push(evidence);
         }
         let adjusted = if terms == Terms::central(self.options.warp) {
-            central
+            None
         } else if terms == self.terms && !terms.asymmetry {
-            self.adjusted
+            Some(self.adjusted)
         } else {
-            let start = self.adjusted.state().with_only(terms);
             let prior = Prior { mounting: mounting(&self.adjusted, self.variance).unwrap_or(1.0), ..self.prior };
-            inlier_fit(self.adjusted.views.clone(), start, terms.free(), Some(prior), self.options)?
-                .after(&self.adjusted)
+            let strength = self.adjusted.strength.map(|strength| strength.mounted(prior));
+            let start = self.adjusted.linear().start(&self.adjusted.views, terms, strength);
+            let (views, arrow) = (self.adjusted.views.clone(), (self.options, &EXACT));
+            Some(inlier_fit(views, start, terms.free(), Some(prior), arrow)?.after(&self.adjusted))
         };
         Ok((adjusted, Evidence { pupil, steps }))
     }

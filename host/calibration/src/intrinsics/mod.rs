@@ -8,6 +8,8 @@
 
 mod adjust;
 mod bundle;
+mod foretold;
+mod held_out;
 mod ladder;
 mod lens;
 mod model;

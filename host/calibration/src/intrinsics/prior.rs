@@ -8,9 +8,8 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use vergence_vision::median;
 
-use super::adjust::{Adjusted, State};
+use super::adjust::{Adjusted, median_of_used};
 use super::lens::{E0, E1, LENS};
 use super::observations::ObservedView;
 
@@ -103,6 +102,16 @@ pub(super) struct Strength {
 }
 
 impl Strength {
+    /// That of `prior`, where this one is of a prior with scatter 1.
+    pub fn scaled(self, prior: Prior) -> Self {
+        Self { of_one: self.of_one * prior.scatter, ..self.mounted(prior) }
+    }
+
+    /// With the mounting of `prior`.
+    pub fn mounted(self, prior: Prior) -> Self {
+        Self { mounting: prior.mounting, ..self }
+    }
+
     /// By what to multiply the deviation from the `nth` of [`KNOWN`], in its standard deviations.
     pub fn of(self, nth: usize) -> f64 {
         if ASYMMETRY.contains(&nth) { self.of_one / self.mounting } else { self.of_one }
@@ -116,8 +125,9 @@ impl Prior {
     }
 
     /// The prior in units of residuals, which weigh by their scale.
-    pub fn strength(self, views: &[ObservedView], state: &State) -> Option<Strength> {
-        Some(Strength { of_one: self.scatter * noise(views, state)?, mounting: self.mounting })
+    /// `deviations` are those of all corners.
+    pub fn strength(self, views: &[ObservedView], deviations: &[f64]) -> Option<Strength> {
+        Some(Strength { of_one: self.scatter * noise(views, deviations)?, mounting: self.mounting })
     }
 }
 
@@ -126,8 +136,7 @@ pub(super) const FINEST: f64 = 1e-4;
 
 /// Standard deviation of a coordinate over the corners used, in units of their relative sigmas: the median length of a two-dimensional
 /// Gaussian error is 1.18 of it.
-fn noise(views: &[ObservedView], state: &State) -> Option<f64> {
+fn noise(views: &[ObservedView], deviations: &[f64]) -> Option<f64> {
     const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
-    let used = views.iter().zip(&state.poses).flat_map(|(v, p)| v.used().map(|s| state.shared.deviation(p, s)));
-    Some(median(used.collect())?.max(FINEST) / RAYLEIGH_MEDIAN)
+    Some(median_of_used(views, deviations)?.max(FINEST) / RAYLEIGH_MEDIAN)
 }

@@ -39,9 +39,9 @@ pub(super) fn report(
     }));
     outliers.sort_by_key(|outlier| (outlier.view, outlier.corner));
 
-    let squares =
-        |used_only| adjusted.views.iter().enumerate().map(|(i, _)| view_squares(adjusted, i, used_only)).sum();
-    let (all, inlier): (Squares, Squares) = (squares(false), squares(true));
+    let squares: Vec<_> =
+        adjusted.views.iter().zip(&adjusted.poses).map(|(v, p)| view_squares(adjusted, v, p)).collect();
+    let [all, inlier]: [Squares; 2] = [0, 1].map(|which| squares.iter().map(|of_view| of_view[which]).sum());
     let sigmas =
         adjusted.views.iter().flat_map(ObservedView::used).map(|observation| Squares::of(observation.relative_sigma));
     Ok(IntrinsicsCalibration {
@@ -61,7 +61,7 @@ pub(super) fn report(
         views_used: adjusted.views.len(),
         tilt_spread,
         outermost,
-        views: view_figures(given, adjusted, &covariances),
+        views: view_figures(given, adjusted, &covariances, &squares),
         outliers,
     })
 }
@@ -154,7 +154,12 @@ impl Covariances {
     }
 }
 
-fn view_figures(given: &[TargetView], adjusted: &Adjusted, covariances: &Covariances) -> Vec<ViewFigures> {
+fn view_figures(
+    given: &[TargetView],
+    adjusted: &Adjusted,
+    covariances: &Covariances,
+    squares: &[[Squares; 2]],
+) -> Vec<ViewFigures> {
     let mut figures: Vec<_> = given
         .iter()
         .map(|view| ViewFigures {
@@ -167,12 +172,11 @@ fn view_figures(given: &[TargetView], adjusted: &Adjusted, covariances: &Covaria
         })
         .collect();
     let unit = &covariances.shared.covariance / covariances.variance;
-    for (block, (view, pose)) in adjusted.views.iter().zip(&adjusted.poses).enumerate() {
+    for (block, ((view, pose), [all, inlier])) in adjusted.views.iter().zip(&adjusted.poses).zip(squares).enumerate() {
         let Some(entry) = figures.get_mut(view.index) else { continue };
-        let inlier = view_squares(adjusted, block, true);
         entry.corners_inlier = inlier.count;
         entry.rms_inlier_px = Some(inlier.rms());
-        entry.rms_px = Some(view_squares(adjusted, block, false).rms());
+        entry.rms_px = Some(all.rms());
         entry.pose = adjusted.normal.block_covariance(block, &unit).map(|covariance| ViewPose {
             camera_from_target: Transform::from_isometry(*pose),
             covariance: covariance * covariances.variance,
@@ -204,10 +208,9 @@ impl std::iter::Sum for Squares {
     }
 }
 
-fn view_squares(adjusted: &Adjusted, block: usize, used_only: bool) -> Squares {
-    let of_view = |(view, pose): (&ObservedView, &nalgebra::Isometry3<f64>)| {
-        let counted = view.observations.iter().filter(|observation| observation.used || !used_only);
-        counted.map(|s| Squares::of(adjusted.shared.residual_px(pose, s))).sum()
-    };
-    adjusted.views.get(block).zip(adjusted.poses.get(block)).map_or_else(Squares::default, of_view)
+/// Of all corners of a view, and of those used.
+fn view_squares(adjusted: &Adjusted, view: &ObservedView, pose: &nalgebra::Isometry3<f64>) -> [Squares; 2] {
+    let of = |s: &Observation| (Squares::of(adjusted.shared.residual_px(pose, s)), s.used);
+    let corners: Vec<_> = view.observations.iter().map(of).collect();
+    [false, true].map(|used_only| corners.iter().filter(|(_, used)| *used || !used_only).map(|(s, _)| *s).sum())
 }

@@ -53,11 +53,8 @@ impl<const B: usize> SchurNormal<B> {
     /// The same where priors were weighted by another variance than that of the residuals.
     #[must_use]
     pub fn clustered_with_priors(&self, variance: f64, of_priors: f64) -> Option<Clustered> {
-        let information = self.shared_information()?;
-        let n = information.nrows();
-        let scale = DMatrix::from_diagonal(&information.diagonal().map(|d| 1.0 / d.sqrt()));
-        let root = Cholesky::new(&scale * &information * &scale)?.l();
-        let whiten = root.solve_lower_triangular(&scale)?;
+        let whiten = self.whiten()?;
+        let n = whiten.nrows();
         let pulls: Vec<Pull> =
             (0..self.block_count()).into_par_iter().map(|block| self.pull(block, &whiten)).collect::<Option<_>>()?;
         let by_views = pulls.iter().fold(DMatrix::zeros(n, n), |sum, pull| sum + &pull.information);
@@ -67,13 +64,50 @@ impl<const B: usize> SchurNormal<B> {
         Some(Clustered { covariance: (&covariance + covariance.transpose()) * 0.5, scatter: factor.sqrt() })
     }
 
+    /// [`Clustered::scatter`] alone, which costs less.
+    #[must_use]
+    pub(crate) fn scatter(&self, variance: f64) -> Option<f64> {
+        let whiten = self.whiten()?;
+        let (mut spread, mut by_views) = (0.0, 0.0);
+        for block in 0..self.block_count() {
+            let (information, gradient) = self.eliminated(block)?;
+            let (information, gradient) = (&whiten * information * whiten.transpose(), &whiten * gradient);
+            by_views += information.trace();
+            spread += grown_square(information, &gradient);
+        }
+        let level = spread / by_views;
+        Some(if level > 0.0 && level.is_finite() { (level / variance).max(1.0).sqrt() } else { 1.0 })
+    }
+
+    /// The coordinates in which the information of all blocks together is the identity.
+    fn whiten(&self) -> Option<DMatrix<f64>> {
+        let information = self.shared_information()?;
+        let scale = DMatrix::from_diagonal(&information.diagonal().map(|d| 1.0 / d.sqrt()));
+        Cholesky::new(&scale * &information * &scale)?.l().solve_lower_triangular(&scale)
+    }
+
     fn pull(&self, block: usize, whiten: &DMatrix<f64>) -> Option<Pull> {
         let (information, gradient) = self.eliminated(block)?;
         let information = whiten * information * whiten.transpose();
-        let eigen = SymmetricEigen::new(information.clone());
-        let grown = eigen.eigenvalues.map(|share| 1.0 / (1.0 - share.clamp(0.0, MOST_LEVERAGE)).sqrt());
-        let gradient = eigen.eigenvectors.tr_mul(&(whiten * gradient)).component_mul(&grown);
-        Some(Pull { information, gradient: &eigen.eigenvectors * gradient })
+        let (along, vectors) = grown(information.clone(), &(whiten * gradient));
+        Some(Pull { information, gradient: vectors * along })
+    }
+}
+
+/// y_v along the eigenvectors of H_v, and these, from H_v and s_v.
+fn grown(information: DMatrix<f64>, gradient: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let eigen = SymmetricEigen::new(information);
+    let grown = eigen.eigenvalues.map(|share| 1.0 / (1.0 - share.clamp(0.0, MOST_LEVERAGE)).sqrt());
+    (eigen.eigenvectors.tr_mul(gradient).component_mul(&grown), eigen.eigenvectors)
+}
+
+/// The square of the length of y_v: without eigenvectors where no direction has more than the most leverage.
+fn grown_square(information: DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
+    let beside =
+        |most: f64| Cholesky::new(DMatrix::from_diagonal_element(gradient.len(), gradient.len(), most) - &information);
+    match (beside(MOST_LEVERAGE), beside(1.0)) {
+        (Some(_), Some(rest)) => gradient.dot(&rest.solve(gradient)),
+        _ => grown(information, gradient).0.norm_squared(),
     }
 }
 

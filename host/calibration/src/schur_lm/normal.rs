@@ -75,61 +75,98 @@ type Coupling<const B: usize> = OMatrix<f64, Dyn, nalgebra::Const<B>>;
 /// The normal equations at one point: the shared block, every small block, and their couplings.
 #[derive(Clone, Debug)]
 pub struct SchurNormal<const B: usize> {
-    shared: DMatrix<f64>,
-    shared_gradient: DVector<f64>,
-    blocks: Vec<SmallBlock<B>>,
-    cost: f64,
-    residuals: usize,
-    squares: f64,
+    /// Of all residuals.
+    pub(super) whole: Part,
+    /// Of those that depend on no small block.
+    pub(super) common: Part,
+    pub(super) blocks: Vec<SmallBlock<B>>,
+}
+
+/// What residuals add to the shared block, its gradient and the cost.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub shared: DMatrix<f64>,
+    pub shared_gradient: DVector<f64>,
+    pub cost: f64,
+    pub residuals: usize,
+    pub squares: f64,
 }
 
 #[derive(Clone, Debug)]
-struct SmallBlock<const B: usize> {
-    /// What the block's residuals add to the shared block and its gradient.
-    shared: DMatrix<f64>,
-    shared_gradient: DVector<f64>,
-    matrix: SMatrix<f64, B, B>,
-    gradient: SVector<f64, B>,
-    coupling: Coupling<B>,
+pub(super) struct SmallBlock<const B: usize> {
+    pub part: Part,
+    pub matrix: SMatrix<f64, B, B>,
+    pub gradient: SVector<f64, B>,
+    pub coupling: Coupling<B>,
+}
+
+impl Part {
+    pub fn of<const B: usize>(equations: &Equations<B>, n: usize) -> Self {
+        let last = n + B;
+        Self {
+            shared: DMatrix::from_fn(n, n, |i, j| equations.at(i, j)),
+            shared_gradient: DVector::from_fn(n, |i, _| equations.at(i, last)),
+            cost: equations.cost,
+            residuals: equations.residuals,
+            squares: equations.at(last, last),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.shared += &other.shared;
+        self.shared_gradient += &other.shared_gradient;
+        self.cost += other.cost;
+        self.residuals += other.residuals;
+        self.squares += other.squares;
+    }
 }
 
 impl<const B: usize> SmallBlock<B> {
-    fn of(part: &Equations<B>, n: usize) -> Self {
+    fn of(equations: &Equations<B>, n: usize) -> Self {
         let last = n + B;
         Self {
-            shared: DMatrix::from_fn(n, n, |i, j| part.at(i, j)),
-            shared_gradient: DVector::from_fn(n, |i, _| part.at(i, last)),
-            matrix: SMatrix::from_fn(|i, j| part.at(n + i, n + j)),
-            gradient: SVector::from_fn(|i, _| part.at(n + i, last)),
-            coupling: Coupling::from_fn_generic(Dyn(n), nalgebra::Const::<B>, |i, j| part.at(i, n + j)),
+            part: Part::of(equations, n),
+            matrix: SMatrix::from_fn(|i, j| equations.at(n + i, n + j)),
+            gradient: SVector::from_fn(|i, _| equations.at(n + i, last)),
+            coupling: Coupling::from_fn_generic(Dyn(n), nalgebra::Const::<B>, |i, j| equations.at(i, n + j)),
         }
+    }
+
+    /// Adds rows whose products are C M⁻¹ Cᵀ and C M⁻¹ g: what the shared block and its gradient lose when this block, of matrix M, coupling C
+    /// and gradient g, is eliminated. `factor` is that of M.
+    fn eliminate(&self, factor: &Cholesky<f64, nalgebra::Const<B>>, rows: &mut Products) -> Option<()> {
+        let n = self.coupling.nrows();
+        let triangle = factor.l_dirty();
+        let mut columns = self.coupling.clone();
+        let mut gradient = self.gradient;
+        // Forward substitution, of all unknowns at once.
+        for i in 0..B {
+            for j in 0..i {
+                let (share, solved) = (triangle[(i, j)], gradient[j]);
+                let (before, mut now) = columns.columns_range_pair_mut(j, i);
+                now.axpy(-share, &before, 1.0);
+                gradient[i] -= share * solved;
+            }
+            let over = 1.0 / triangle[(i, i)];
+            columns.column_mut(i).scale_mut(over);
+            gradient[i] *= over;
+            let row = rows.row();
+            row[..n].copy_from_slice(columns.column(i).as_slice());
+            row[n] = gradient[i];
+        }
+        gradient.iter().all(|value| value.is_finite()).then_some(())
     }
 }
 
 impl<const B: usize> SchurNormal<B> {
-    pub(super) fn from_parts(n: usize, common: &Equations<B>, parts: &[Equations<B>]) -> Self {
-        let last = n + B;
-        let mut normal = Self {
-            shared: DMatrix::zeros(n, n),
-            shared_gradient: DVector::zeros(n),
-            blocks: Vec::with_capacity(parts.len()),
-            cost: 0.0,
-            residuals: 0,
-            squares: 0.0,
-        };
-        normal.blocks.extend(parts.iter().map(|part| SmallBlock::of(part, n)));
-        normal.shared += DMatrix::from_fn(n, n, |i, j| common.at(i, j));
-        normal.shared_gradient += DVector::from_fn(n, |i, _| common.at(i, last));
-        for block in &normal.blocks {
-            normal.shared += &block.shared;
-            normal.shared_gradient += &block.shared_gradient;
-        }
-        for part in std::iter::once(common).chain(parts) {
-            normal.cost += part.cost;
-            normal.residuals += part.residuals;
-            normal.squares += part.at(last, last);
-        }
-        normal
+    pub(super) fn from_equations(n: usize, common: &Equations<B>, parts: &[Equations<B>]) -> Self {
+        Self::from_blocks(Part::of(common, n), parts.iter().map(|part| SmallBlock::of(part, n)).collect())
+    }
+
+    pub(super) fn from_blocks(common: Part, blocks: Vec<SmallBlock<B>>) -> Self {
+        let mut whole = common.clone();
+        blocks.iter().for_each(|block| whole.add(&block.part));
+        Self { whole, common, blocks }
     }
 
     pub(super) const fn block_count(&self) -> usize {
@@ -139,43 +176,47 @@ impl<const B: usize> SchurNormal<B> {
     /// The information and the gradient of the shared unknowns by small block `index` alone, its own unknowns eliminated. `None`
     /// where it is singular.
     pub(super) fn eliminated(&self, index: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let block = self.blocks.get(index)?;
-        let factor = Cholesky::new(block.matrix)?;
-        let information = &block.shared - &block.coupling * factor.solve(&block.coupling.transpose());
-        Some((information, &block.shared_gradient - &block.coupling * factor.solve(&block.gradient)))
+        let SmallBlock { part, matrix, .. } = self.blocks.get(index)?;
+        let n = part.shared.nrows();
+        let mut taken = Products::new(n + 1);
+        self.blocks.get(index)?.eliminate(&Cholesky::new(*matrix)?, &mut taken)?;
+        taken.sum();
+        let information = DMatrix::from_fn(n, n, |i, j| part.shared[(i, j)] - taken.at(i, j));
+        Some((information, DVector::from_fn(n, |i, _| part.shared_gradient[i] - taken.at(i, n))))
     }
 
     /// ½ Σ ρ(‖r‖²).
     #[must_use]
     pub const fn cost(&self) -> f64 {
-        self.cost
+        self.whole.cost
     }
 
     /// The number of residual components.
     #[must_use]
     pub const fn residuals(&self) -> usize {
-        self.residuals
+        self.whole.residuals
     }
 
     /// The estimated variance of one residual component, Σ r² over the degrees of freedom (residuals less unknowns),
     /// after the robust weights; `None` without redundancy.
     #[must_use]
     pub fn variance(&self) -> Option<f64> {
-        let unknowns = self.shared.nrows() + B * self.blocks.len();
-        let freedom = self.residuals.checked_sub(unknowns).filter(|&f| f > 0)?;
-        Some(self.squares / freedom as f64)
+        let unknowns = self.whole.shared.nrows() + B * self.blocks.len();
+        let freedom = self.whole.residuals.checked_sub(unknowns).filter(|&f| f > 0)?;
+        Some(self.whole.squares / freedom as f64)
     }
 
     /// The largest cosine between a column of the Jacobian and the residuals: zero at a minimum.
     pub(super) fn gradient_cosine(&self) -> f64 {
-        let length = self.squares.sqrt();
+        let length = self.whole.squares.sqrt();
         let cosine = |gradient: f64, square: f64| {
             if square > 0.0 && length > 0.0 { gradient.abs() / (square.sqrt() * length) } else { 0.0 }
         };
         let shared = self
+            .whole
             .shared_gradient
             .iter()
-            .zip(self.shared.diagonal().iter())
+            .zip(self.whole.shared.diagonal().iter())
             .map(|(&g, &s)| cosine(g, s))
             .fold(0.0, f64::max);
         let block = |b: &SmallBlock<B>| (0..B).map(|i| cosine(b.gradient[i], b.matrix[(i, i)])).fold(0.0, f64::max);
@@ -194,7 +235,7 @@ impl<const B: usize> SchurNormal<B> {
             .collect();
         let term = |d: f64, g: f64, diagonal: f64| 0.5 * d * (damping * damped_diagonal(diagonal) * d - g);
         let mut predicted: f64 =
-            (0..shared.len()).map(|i| term(shared[i], self.shared_gradient[i], self.shared[(i, i)])).sum();
+            (0..shared.len()).map(|i| term(shared[i], self.whole.shared_gradient[i], self.whole.shared[(i, i)])).sum();
         for (step, block) in blocks.iter().zip(&self.blocks) {
             predicted += (0..B).map(|i| term(step[i], block.gradient[i], block.matrix[(i, i)])).sum::<f64>();
         }
@@ -205,11 +246,13 @@ impl<const B: usize> SchurNormal<B> {
     /// is [`Self::shared_covariance`]. `None` where a small block is singular.
     #[must_use]
     pub fn shared_information(&self) -> Option<DMatrix<f64>> {
-        let mut schur = self.shared.clone();
+        let n = self.whole.shared.nrows();
+        let mut taken = Products::new(n + 1);
         for block in &self.blocks {
-            schur -= &block.coupling * Cholesky::new(block.matrix)?.solve(&block.coupling.transpose());
+            block.eliminate(&Cholesky::new(block.matrix)?, &mut taken)?;
         }
-        Some(schur)
+        taken.sum();
+        Some(DMatrix::from_fn(n, n, |i, j| self.whole.shared[(i, j)] - taken.at(i, j)))
     }
 
     /// The marginal covariance of the shared step for unit variance of a residual component: multiply by
@@ -236,21 +279,22 @@ impl<const B: usize> SchurNormal<B> {
     }
 
     fn reduce(&self, damping: f64) -> Option<Reduced<B>> {
-        let n = self.shared.nrows();
-        let mut schur = self.shared.clone();
-        (0..n).for_each(|i| schur[(i, i)] += damping * damped_diagonal(self.shared[(i, i)]));
-        let mut gradient = self.shared_gradient.clone();
+        let n = self.whole.shared.nrows();
+        let mut taken = Products::new(n + 1);
         let mut blocks = Vec::with_capacity(self.blocks.len());
         for block in &self.blocks {
             let mut matrix = block.matrix;
             (0..B).for_each(|i| matrix[(i, i)] += damping * damped_diagonal(block.matrix[(i, i)]));
             let factor = Cholesky::new(matrix)?;
             if n > 0 {
-                schur -= &block.coupling * factor.solve(&block.coupling.transpose());
-                gradient -= &block.coupling * factor.solve(&block.gradient);
+                block.eliminate(&factor, &mut taken)?;
             }
             blocks.push(factor);
         }
+        taken.sum();
+        let mut schur = DMatrix::from_fn(n, n, |i, j| self.whole.shared[(i, j)] - taken.at(i, j));
+        (0..n).for_each(|i| schur[(i, i)] += damping * damped_diagonal(self.whole.shared[(i, i)]));
+        let gradient = DVector::from_fn(n, |i, _| self.whole.shared_gradient[i] - taken.at(i, n));
         let shared = if n > 0 { Some(Cholesky::new(schur)?) } else { None };
         Some(Reduced { shared, gradient, blocks })
     }

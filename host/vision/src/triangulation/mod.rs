@@ -143,6 +143,6 @@ fn triangulated(
 }
 
 /// Takes the condition that must hold, so that a comparison with NaN rejects.
-fn require(holds: bool, otherwise: Rejection) -> Result<(), Rejection> {
+pub(crate) fn require<E>(holds: bool, otherwise: E) -> Result<(), E> {
     if holds { Ok(()) } else { Err(otherwise) }
 }
