@@ -68,3 +68,7 @@ impl<const B: usize> SchurNormal<B> {
         Some((step, part.cost + by_shared + 0.5 * step.dot(&gradient)))
     }
 }
+
+#[cfg(test)]
+#[path = "../../tests/unit/nearby.rs"]
+mod tests;
