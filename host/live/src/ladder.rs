@@ -132,14 +132,15 @@ impl Ladder {
         self.note_limit(result.limited).into_iter().for_each(&mut tell);
         if let Some((rate, limit)) = result.pace.filter(|_| self.results >= RATED) {
             let skipped = result.totals.skipped.get(&SkipReason::NewerCame).copied().unwrap_or_default();
-            self.note_pace(rate, limit, skipped).into_iter().for_each(tell);
+            let is_vain = result.limited.is_some_and(|limited| !limited.helps);
+            self.note_pace(rate, (limit, is_vain), skipped).into_iter().for_each(tell);
         }
     }
 
     /// A limit that comes and goes near all points is not told each time.
     fn note_limit(&mut self, limited: Option<PointLimit>) -> Option<Notice> {
         match limited {
-            Some(PointLimit { most, of }) if !self.has_few && (most as f64) < TOLD_LIMIT * of as f64 => {
+            Some(PointLimit { most, of, .. }) if !self.has_few && (most as f64) < TOLD_LIMIT * of as f64 => {
                 self.has_few = true;
                 let text =
                     format!("fewer points: at most {most} of {of} are looked for, so that every exposure is measured");
@@ -152,14 +153,16 @@ impl Ladder {
         }
     }
 
-    fn note_pace(&mut self, rate: f64, limit: Limit, skipped: u64) -> Option<Notice> {
+    /// It is vain to look for fewer points where a pair takes the whole period without any.
+    fn note_pace(&mut self, rate: f64, (limit, is_vain): (Limit, bool), skipped: u64) -> Option<Notice> {
         let is_slow = limit == Limit::Matching;
         if std::mem::replace(&mut self.is_slow, is_slow) == is_slow {
             return None;
         }
         let text = if is_slow {
+            let whatever = if is_vain { ", whatever its points" } else { "" };
             format!(
-                "lower rate: {rate:.1} Hz, because matching takes longer than the next exposure; {skipped} skipped so far"
+                "lower rate: {rate:.1} Hz, because matching takes longer than the next exposure{whatever}; {skipped} skipped so far"
             )
         } else {
             format!("full rate again: {rate:.1} Hz, every exposure is measured")

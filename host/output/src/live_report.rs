@@ -49,14 +49,15 @@ fn dense_json(dense: Option<&LiveDense>) -> Value {
 
 /// To how many points time limits a pair, to go on with after a comma.
 #[must_use]
-pub fn point_limit_words(PointLimit { most, of }: PointLimit) -> String {
-    format!("points limited by time: {most} of {of}, ")
+pub fn point_limit_words(PointLimit { most, of, helps }: PointLimit) -> String {
+    let in_vain = if helps { "" } else { " (fewer would not help: a pair takes the whole period without any)" };
+    format!("points limited by time: {most} of {of}{in_vain}, ")
 }
 
 /// The same; null where there is time for all.
 #[must_use]
 pub fn point_limit_json(limit: Option<PointLimit>) -> Value {
-    limit.map_or(Value::Null, |PointLimit { most, of }| json!({ "most": most, "of": of }))
+    limit.map_or(Value::Null, |PointLimit { most, of, helps }| json!({ "most": most, "of": of, "helps": helps }))
 }
 
 /// The points, what became of the other matches, and by which pose of `rig` they were made.

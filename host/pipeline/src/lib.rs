@@ -30,6 +30,7 @@ mod memory;
 mod mode_outlook;
 mod observation;
 mod pair;
+mod pair_time;
 mod point_budget;
 mod pose;
 mod pose_source;
