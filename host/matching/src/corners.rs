@@ -114,7 +114,7 @@ fn response(plane: &Plane, rows: Range<usize>) -> Plane {
 }
 
 /// The products of the central differences in a row, by columns first, by rows, and both; 0 at the ends.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn gradient_products([above, row, below]: [&[f32]; 3], [xx, xy, yy]: [&mut [f32]; 3]) {
     for products in [&mut *xx, &mut *xy, &mut *yy] {
         products.first_mut().into_iter().for_each(|first| *first = 0.0);
@@ -129,7 +129,7 @@ fn gradient_products([above, row, below]: [&[f32]; 3], [xx, xy, yy]: [&mut [f32]
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn harmonic_means([xx, xy, yy]: [&[f32]; 3], out: &mut [f32]) {
     let (xx, xy, yy) = (&xx[..out.len()], &xy[..out.len()], &yy[..out.len()]);
     for x in 0..out.len() {
@@ -155,7 +155,7 @@ fn maxima(plane: &Plane, rows: Range<usize>, level: usize) -> Vec<Corner> {
 }
 
 /// Which pixels of a row are high and no lower than those beside, above and below them. Most are no maximum already by that.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn are_highest([above, row, below]: [&[f32]; 3], highest: &mut [bool]) {
     let inner = row.len().saturating_sub(2);
     let (left, here, right) = (&row[..inner], &row[1..][..inner], &row[2..][..inner]);

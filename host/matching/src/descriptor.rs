@@ -117,7 +117,7 @@ fn add(
 /// Lengths of gradients, times `weight`, and their directions in parts of a turn, from 0 up to the number of directions.
 ///
 /// The arc tangent is the polynomial 4.4.49 of M. Abramowitz and I. Stegun, *Handbook of Mathematical Functions*, 1964: right to 2e-8.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn polar([gx, gy]: [&[f32; SIDE]; 2], weight: &[f32; SIDE], [magnitude, turn]: [&mut [f32; SIDE]; 2]) {
     use std::f32::consts::{FRAC_PI_2, PI, TAU};
     const SERIES: [f32; 9] = [

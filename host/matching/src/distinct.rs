@@ -81,7 +81,7 @@ impl<'a> Surroundings<'a> {
 }
 
 /// The loop of [`Surroundings::shows`], many columns at a time.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn shows(place: &Window, lines: &[&[f32]; SIDE], inverse_norms: &[f32], columns: Range<usize>) -> bool {
     let Some(last) = inverse_norms.len().checked_sub(HALF + TOGETHER).filter(|last| *last >= HALF) else {
         return false;

@@ -98,7 +98,7 @@ impl<const N: usize> Ring<N> {
 /// The weighted sum of rows, in the order of the weights.
 ///
 /// Four rows at a time are added to what there is: a loop over the columns alone is what compilers turn into vector instructions.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn weigh(weights: &[f32], rows: &[&[f32]], out: &mut [f32]) {
     let width = out.len();
     out.fill(0.0);

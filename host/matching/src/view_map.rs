@@ -171,13 +171,13 @@ impl Line {
 }
 
 /// Interpolates the pixels of a row between those of its knots; NaN where one of four knots has none.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn between(knots: &[[f64; 2]], pixels: &mut [[f64; 2]]) {
     knots.windows(4).zip(pixels.chunks_mut(KNOT)).for_each(|(knots, pixels)| interpolate(knots, pixels));
 }
 
 /// Says which pixels of a row the camera sees, whose rays have the z `by_sine` sin a + `by_cosine` cos a.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn see(inside: &Inside, pixels: &[[f64; 2]], turns: &[(f64, f64)], [by_sine, by_cosine]: [f64; 2], seen: &mut [bool]) {
     for ((seen, &[u, v]), (sine, cosine)) in seen.iter_mut().zip(pixels).zip(turns) {
         *seen = inside.contains(sine * by_sine + cosine * by_cosine, &Pixel { u, v });
@@ -186,8 +186,8 @@ fn see(inside: &Inside, pixels: &[[f64; 2]], turns: &[(f64, f64)], [by_sine, by_
 
 /// Finds the pixels around each place of a row that is `seen`. Positions are split by a sum that rounds them, in loops without branches: only then
 /// do compilers turn them into vector instructions.
-#[multiversion(targets("x86_64+avx2"))]
-fn place((width, height): (u32, u32), pixels: &[[f64; 2]], seen: &mut [bool], places: &mut Places) {
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
+fn place((width, height): (u32, u32), pixels: &[[f64; 2]], seen: &[bool], places: &mut Places) {
     const TOGETHER: usize = 32;
     /// A number to which others are added that are less than it, and not negative, has no bits for their fractions: the sum is rounded.
     const ROUNDING: f64 = (1_u64 << (f64::MANTISSA_DIGITS - 1)) as f64;
@@ -197,13 +197,17 @@ fn place((width, height): (u32, u32), pixels: &[[f64; 2]], seen: &mut [bool], pl
     past_u.resize(pixels.len(), 0.0);
     past_v.resize(pixels.len(), 0.0);
     let out = firsts.chunks_mut(TOGETHER).zip(past_u.chunks_mut(TOGETHER)).zip(past_v.chunks_mut(TOGETHER));
-    for ((pixels, seen), ((firsts, past_u), past_v)) in pixels.chunks(TOGETHER).zip(seen.chunks_mut(TOGETHER)).zip(out)
-    {
+    for ((pixels, seen), ((firsts, past_u), past_v)) in pixels.chunks(TOGETHER).zip(seen.chunks(TOGETHER)).zip(out) {
+        let (mut around, mut inside) = ([[0.0_f64; 2]; TOGETHER], [false; TOGETHER]);
+        around[..pixels.len()].copy_from_slice(pixels);
+        inside[..seen.len()].copy_from_slice(seen);
         let (mut columns, mut rows) = ([1.0_f64; TOGETHER], [1.0_f64; TOGETHER]);
-        for (i, (&[u, v], seen)) in pixels.iter().zip(seen.iter_mut()).enumerate() {
+        for i in 0..TOGETHER {
+            let [u, v] = around[i];
             // Pixels that are seen are at least one pixel inside the camera's images; this image may be smaller.
-            *seen &= (u < most_u) & (v < most_v);
-            (columns[i], rows[i]) = if *seen { (u, v) } else { (1.0, 1.0) };
+            let is_inside = inside[i] & (u < most_u) & (v < most_v);
+            (columns[i], rows[i]) = if is_inside { (u, v) } else { (1.0, 1.0) };
+            inside[i] = is_inside;
         }
         let (mut found, mut past) = ([0_u32; TOGETHER], [[0.0_f32; TOGETHER]; 2]);
         for i in 0..TOGETHER {
@@ -212,11 +216,12 @@ fn place((width, height): (u32, u32), pixels: &[[f64; 2]], seen: &mut [bool], pl
             (past[0][i], past[1][i]) = ((columns[i] - column) as f32, (rows[i] - row) as f32);
             found[i] = ((row - 1.0) * stride + (column - 1.0) + ROUNDING).to_bits() as u32;
         }
+        for i in 0..TOGETHER {
+            found[i] = if inside[i] { found[i] } else { UNSEEN };
+        }
         past_u.copy_from_slice(&past[0][..pixels.len()]);
         past_v.copy_from_slice(&past[1][..pixels.len()]);
-        for ((first, found), seen) in firsts.iter_mut().zip(found).zip(seen) {
-            *first = if *seen { found } else { UNSEEN };
-        }
+        firsts.copy_from_slice(&found[..pixels.len()]);
     }
 }
 

@@ -58,7 +58,7 @@ impl Template {
     }
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn prepare(template: &mut Template, plane: &Plane, at: ViewPixel) -> Result<(), UnmatchedReason> {
     template.at = at;
     template.window.fill(&surroundings(plane, at).ok_or(UnmatchedReason::NotRefined)?);
@@ -67,12 +67,12 @@ fn prepare(template: &mut Template, plane: &Plane, at: ViewPixel) -> Result<(), 
     Ok(())
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn settle(template: &Template, image: &Plane, start: Warp) -> Result<Warp, UnmatchedReason> {
     Ok(iterate(template, image, start)?.0)
 }
 
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2"))]
 fn fit(template: &Template, image: &Plane, start: Warp) -> Result<Fit, UnmatchedReason> {
     let (warp, values, solution) = iterate(template, image, start)?;
     let (correlation, variance) = template.window.quality(&values, &solution);
