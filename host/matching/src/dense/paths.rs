@@ -146,10 +146,10 @@ impl Path for Narrow {
     fn advance(&mut self, first: i32, costs: &[u8], sums: &mut [u8]) {
         const MOST: i32 = NARROW as i32 - 1;
         let from = (MOST + (first - self.first).clamp(-MOST, MOST)) as usize;
-        let (Some(costs), Some(sums)) = (costs.first_chunk(), sums.first_chunk_mut()) else { return };
-        let here = step(costs, &self.last[from..][..LANES + 2], self.bounds, sums);
-        self.last[NARROW..NARROW + LANES].copy_from_slice(&here);
-        self.bounds = bounds(&here);
+        let (Some(costs), Some(sums)) = (costs.first_chunk::<LANES>(), sums.first_chunk_mut::<LANES>()) else { return };
+        let mut next = [0; LANES];
+        self.bounds = step(costs, &self.last[from..][..LANES + 2], self.bounds, &mut next, sums);
+        self.last[NARROW..NARROW + LANES].copy_from_slice(&next);
         self.first = first;
     }
 }
@@ -174,38 +174,28 @@ impl Path for Wide {
         let most = room as i32 - 1;
         let from = (most + (first - self.first).clamp(-most, most)) as usize;
         let before = &self.last[from..from + count + 2];
-        let costs = costs.as_chunks::<LANES>().0;
-        let (next, sums) = (self.next[room..room + count].as_chunks_mut().0, sums.as_chunks_mut().0);
-        let mut least = [u8::MAX; LANES];
-        for (block, ((costs, next), sums)) in costs.iter().zip(next).zip(sums).enumerate() {
-            *next = step(costs, &before[block * LANES..][..LANES + 2], self.bounds, sums);
-            least = std::array::from_fn(|i| least[i].min(next[i]));
-        }
-        self.bounds = bounds(&least);
+        self.bounds = step(costs, before, self.bounds, &mut self.next[room..room + count], sums);
         self.first = first;
         std::mem::swap(&mut self.last, &mut self.next);
     }
 }
 
-/// The least of some costs, and that of a jump from there.
+/// Writes the costs at the next pixel of a path to `next`, adds them to `sums`, and returns the least of them and that of a jump from there. `before` are those at the
+/// last pixel, from the hypothesis before the first one on.
+///
+/// One plain loop: compilers turn it into the widest vector instructions that there are.
 #[inline(always)]
-fn bounds(costs: &[u8; LANES]) -> [u8; 2] {
-    let eight: [u8; 8] = std::array::from_fn(|i| costs[i].min(costs[i + 8]));
-    let four: [u8; 4] = std::array::from_fn(|i| eight[i].min(eight[i + 4]));
-    let least = four[0].min(four[2]).min(four[1].min(four[3]));
-    [least, least.wrapping_add(P2)]
-}
-
-/// The costs of a block of hypotheses at the next pixel of a path, which are added to `sums`. `before` are those at the last pixel, from the hypothesis before
-/// the first one on.
-#[inline(always)]
-fn step(costs: &[u8; LANES], before: &[u8], [least, jump]: [u8; 2], sums: &mut [u8; LANES]) -> [u8; LANES] {
-    let of = |from: usize| -> [u8; LANES] { before[from..].first_chunk().copied().unwrap_or([UNTRIED; LANES]) };
-    let (below, same, above) = (of(0), of(1), of(2));
-    let here: [u8; LANES] = std::array::from_fn(|i| {
+fn step(costs: &[u8], before: &[u8], [least, jump]: [u8; 2], next: &mut [u8], sums: &mut [u8]) -> [u8; 2] {
+    let count = costs.len();
+    let (below, same, above) = (&before[..count], &before[1..count + 1], &before[2..count + 2]);
+    let (next, sums) = (&mut next[..count], &mut sums[..count]);
+    let mut lowest = u8::MAX;
+    for i in 0..count {
         let near = below[i].min(above[i]).saturating_add(P1);
-        costs[i].wrapping_add(same[i].min(near).min(jump).wrapping_sub(least))
-    });
-    *sums = std::array::from_fn(|i| sums[i].saturating_add(here[i]));
-    here
+        let here = costs[i].wrapping_add(same[i].min(near).min(jump).wrapping_sub(least));
+        next[i] = here;
+        sums[i] = sums[i].saturating_add(here);
+        lowest = lowest.min(here);
+    }
+    [lowest, lowest.wrapping_add(P2)]
 }

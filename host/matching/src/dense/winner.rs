@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::volume::{Hypotheses, LANES};
+use super::volume::Hypotheses;
 
 /// Largest difference between the choices of the left and the right view, in hypotheses.
 const TOLERANCE: i32 = 1;
@@ -52,12 +52,8 @@ fn chosen(out: &mut [f32], sums: &[u8], first: &[i32], [left, right]: [&[bool]; 
 /// The first hypothesis of the least sum.
 #[inline(always)]
 fn least(cell: &[u8]) -> usize {
-    let mut smallest = [u32::MAX; LANES];
-    for (block, cell) in cell.as_chunks::<LANES>().0.iter().enumerate() {
-        let first = (block * LANES) as u32;
-        smallest = std::array::from_fn(|i| smallest[i].min((u32::from(cell[i]) << 16) | first.wrapping_add(i as u32)));
-    }
-    (smallest.into_iter().fold(u32::MAX, u32::min) & 0xFFFF) as usize
+    let least = cell.iter().fold(u8::MAX, |least, sum| least.min(*sum));
+    cell.iter().position(|sum| *sum == least).unwrap_or_default()
 }
 
 /// The minimum of the parabola through three sums at -1, 0, 1.
@@ -73,9 +69,8 @@ const BIAS: i32 = 0x4000;
 /// Offers the sums of a left pixel to the right pixels that are its partners: each keeps the least one with its disparity.
 #[inline(always)]
 fn offer(best: &mut [u32], cell: &[u8], first: i32) {
-    for (block, (best, cell)) in best.as_chunks_mut::<LANES>().0.iter_mut().zip(cell.as_chunks::<LANES>().0).enumerate()
-    {
-        let disparity = (first + BIAS + (block * LANES) as i32) as u32;
-        *best = std::array::from_fn(|i| best[i].min((u32::from(cell[i]) << 16) | disparity.wrapping_add(i as u32)));
+    let (best, disparity) = (&mut best[..cell.len()], (first + BIAS) as u32);
+    for i in 0..cell.len() {
+        best[i] = best[i].min((u32::from(cell[i]) << 16) | disparity.wrapping_add(i as u32));
     }
 }
