@@ -4,9 +4,9 @@
 use rayon::prelude::*;
 use vergence_vision::Frame;
 
+use super::blocks::summed;
 use super::census::{REACH, census};
-use super::paths::gathered;
-use super::volume::{CensusView, Costs, Hypotheses, LANES, give_back};
+use super::volume::{CensusView, Costs, Hypotheses, LANES};
 use super::winner::winners;
 use crate::View;
 use crate::epipolar_band::EpipolarBand;
@@ -93,10 +93,11 @@ impl Levels {
             CensusView { words: census(plane), seen: self.seen[side].level(plane, 1 << level) }
         });
         let spans = left.spans(hypotheses.width);
-        let sums = gathered(&Costs::new([&left, &right], hypotheses, &spans));
-        let winners = winners(&sums, [&left.seen, &right.seen], hypotheses);
-        give_back(sums);
-        winners
+        let mut disparities = vec![f32::NAN; hypotheses.first.len()];
+        summed(&Costs::new([&left, &right], hypotheses, &spans), |top, sums| {
+            winners(&mut disparities, (top, sums), [&left.seen, &right.seen], hypotheses);
+        });
+        disparities
     }
 }
 

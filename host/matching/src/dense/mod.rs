@@ -9,6 +9,7 @@
 //! Terms: the *disparity* d is the parallax along a row; a *hypothesis* is a disparity that is tried; a *volume* has
 //! one number for each pixel and hypothesis.
 
+mod blocks;
 mod census;
 mod depth;
 mod directions;

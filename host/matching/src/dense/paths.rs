@@ -11,60 +11,69 @@
 use std::ops::Range;
 
 use multiversion::multiversion;
-use rayon::prelude::*;
 
-use super::volume::{Costs, Hypotheses, LANES, memory};
+use super::volume::{Costs, Hypotheses, LANES};
 
 /// Penalty of a step by one hypothesis, as on slanted surfaces.
 const P1: u8 = 8;
 /// Penalty of a larger step, as at edges of objects.
 const P2: u8 = 60;
-/// Number of columns processed together: the costs of a strip stay in the cache on the way there and back.
-const STRIP: usize = 16;
-/// Number of rows processed together: each pixel of a path waits for the one before, those of other paths do not.
-const ROWS: usize = 4;
+/// Number of rows whose paths are advanced together: each pixel of a path waits for the one before, those of other paths do not.
+pub(super) const ROWS: usize = 4;
 /// Cost of a hypothesis that the neighbour did not try, larger than any true cost: those are at most 62 + P2, and that of a jump 62 + 2 P2.
 const UNTRIED: u8 = u8::MAX;
 
-/// Sums the path costs of every hypothesis, by rows, pixels and hypotheses. Sums that would be larger are 255: where that is the least one, the
-/// views have nothing in common. Paths begin and end with the columns of each row that the left camera sees: beyond them all hypotheses cost
-/// the same, so that a path brings nothing from there.
-pub(super) fn gathered(costs: &Costs<'_>) -> Vec<u8> {
-    let Hypotheses { width, height, count, .. } = *costs.hypotheses();
-    let mut sums = memory(width * height * count);
-    sums.par_chunks_mut(ROWS * width * count).enumerate().for_each_init(Vec::new, |scratch, (block, sums)| {
-        sums.fill(0);
-        scratch.resize(sums.len(), 0);
-        along_rows(costs, block * ROWS, scratch, sums);
-    });
-    let mut strips: Vec<Vec<&mut [u8]>> = (0..width.div_ceil(STRIP)).map(|_| Vec::with_capacity(height)).collect();
-    for row in sums.chunks_mut(width * count) {
-        strips.iter_mut().zip(row.chunks_mut(STRIP * count)).for_each(|(strip, part)| strip.push(part));
-    }
-    strips.par_iter_mut().enumerate().for_each_init(Vec::new, |scratch, (strip, rows)| {
-        scratch.resize(height * STRIP * count, 0);
-        along_columns(costs, strip * STRIP, scratch, rows);
-    });
-    sums
+/// Paths side by side.
+#[derive(Clone)]
+pub(super) enum Paths {
+    Narrow(Vec<Narrow>),
+    Wide(Vec<Wide>),
 }
 
+impl Paths {
+    /// So many paths before their first pixels, for `count` hypotheses.
+    pub(super) fn new(paths: usize, count: usize) -> Self {
+        match count {
+            LANES => Self::Narrow((0..paths).map(|_| Narrow::new(count)).collect()),
+            _ => Self::Wide((0..paths).map(|_| Wide::new(count)).collect()),
+        }
+    }
+}
+
+/// Advances paths along the rows from `top` on, both ways, and adds their costs to `sums`; the costs of the pixels go to `scratch`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
-fn along_rows(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [u8]) {
+pub(super) fn along_rows(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [u8]) {
     match costs.hypotheses().count {
         LANES => rows::<Narrow>(costs, top, scratch, sums),
         _ => rows::<Wide>(costs, top, scratch, sums),
     }
 }
 
+/// Advances paths up the columns from `left` on, through some rows.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
-fn along_columns(costs: &Costs<'_>, left: usize, scratch: &mut [u8], strip: &mut [&mut [u8]]) {
-    match costs.hypotheses().count {
-        LANES => columns::<Narrow>(costs, left, scratch, strip),
-        _ => columns::<Wide>(costs, left, scratch, strip),
+pub(super) fn upwards(costs: &Costs<'_>, left: usize, rows: Range<usize>, paths: &mut Paths) {
+    match paths {
+        Paths::Narrow(paths) => through(costs, left, rows, paths),
+        Paths::Wide(paths) => through(costs, left, rows, paths),
     }
 }
 
-/// Advances paths along the rows from `top` on, both ways; their costs go to `scratch`.
+/// Advances paths `down` and `up` the columns from `left` on, and adds their costs to the `sums` of some rows; the costs of the pixels go to `scratch`.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2+fma+popcnt", "x86_64+avx2+fma+popcnt"))]
+pub(super) fn along_columns(
+    costs: &Costs<'_>,
+    left: usize,
+    (rows, sums): (Range<usize>, &mut [&mut [u8]]),
+    scratch: &mut [u8],
+    paths: [&mut Paths; 2],
+) {
+    match paths {
+        [Paths::Narrow(down), Paths::Narrow(up)] => columns(costs, left, (rows, sums), scratch, [down, up]),
+        [Paths::Wide(down), Paths::Wide(up)] => columns(costs, left, (rows, sums), scratch, [down, up]),
+        _ => {}
+    }
+}
+
 #[inline(always)]
 fn rows<P: Path>(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [u8]) {
     let Hypotheses { width, count, ref first, .. } = *costs.hypotheses();
@@ -86,30 +95,42 @@ fn rows<P: Path>(costs: &Costs<'_>, top: usize, scratch: &mut [u8], sums: &mut [
     }
 }
 
-/// Advances paths along the columns of a strip from `left` on, both ways; their costs go to `scratch`.
 #[inline(always)]
-fn columns<P: Path>(costs: &Costs<'_>, left: usize, scratch: &mut [u8], strip: &mut [&mut [u8]]) {
+fn through<P: Path>(costs: &Costs<'_>, left: usize, rows: Range<usize>, paths: &mut [P]) {
     let Hypotheses { width, count, ref first, .. } = *costs.hypotheses();
-    let columns = strip.first().map_or(0, |row| row.len() / count);
-    let mut paths: Vec<P> = (0..columns).map(|_| P::new(count)).collect();
-    let is_seen = |span: &Range<usize>| span.start < left + columns && span.end > left;
-    let top = costs.spans().iter().position(is_seen).unwrap_or_default();
-    let bottom = costs.spans().iter().rposition(is_seen).map_or(top, |last| last + 1);
-    let row = columns * count;
-    for y in top..bottom {
-        costs.fill(&mut scratch[y * row..(y + 1) * row], y, left..left + columns);
+    let mut row = vec![0; paths.len() * count];
+    let mut unused = vec![0; count];
+    for y in rows.rev() {
+        costs.fill(&mut row, y, left..left + paths.len());
+        for ((path, first), costs) in paths.iter_mut().zip(&first[y * width + left..]).zip(row.chunks_exact(count)) {
+            path.advance(*first, costs, &mut unused);
+        }
     }
-    for y in there_and_back(top..bottom) {
-        let Some(y) = y else {
-            paths.iter_mut().for_each(|path| *path = P::new(count));
-            continue;
-        };
-        let first = &first[y * width + left..][..columns];
-        let cells = scratch[y * row..].chunks_exact(count).zip(strip[y].chunks_exact_mut(count));
+}
+
+#[inline(always)]
+fn columns<P: Path>(
+    costs: &Costs<'_>,
+    left: usize,
+    (rows, sums): (Range<usize>, &mut [&mut [u8]]),
+    scratch: &mut [u8],
+    [down, up]: [&mut [P]; 2],
+) {
+    let Hypotheses { width, count, ref first, .. } = *costs.hypotheses();
+    let row = down.len() * count;
+    for (scratch, y) in scratch.chunks_exact_mut(row).zip(rows.clone()) {
+        costs.fill(scratch, y, left..left + down.len());
+    }
+    let mut advance = |paths: &mut [P], y: usize| {
+        let first = &first[y * width + left..][..paths.len()];
+        let y = y - rows.start;
+        let cells = scratch[y * row..].chunks_exact(count).zip(sums[y].chunks_exact_mut(count));
         for ((path, first), (costs, sums)) in paths.iter_mut().zip(first).zip(cells) {
             path.advance(*first, costs, sums);
         }
-    }
+    };
+    rows.clone().for_each(|y| advance(down, y));
+    rows.clone().rev().for_each(|y| advance(up, y));
 }
 
 /// Counts through `range` and, after `None`, back again.
@@ -126,7 +147,8 @@ trait Path {
 }
 
 /// Costs of as many hypotheses as a vector has, padded on both sides for those that were not tried.
-struct Narrow {
+#[derive(Clone)]
+pub(super) struct Narrow {
     first: i32,
     /// Least cost at the last pixel, and that of a jump from it.
     bounds: [u8; 2],
@@ -155,7 +177,8 @@ impl Path for Narrow {
 }
 
 /// Costs of more hypotheses, padded in the same way.
-struct Wide {
+#[derive(Clone)]
+pub(super) struct Wide {
     first: i32,
     bounds: [u8; 2],
     last: Vec<u8>,

@@ -8,17 +8,20 @@ use super::volume::Hypotheses;
 /// Largest difference between the choices of the left and the right view, in hypotheses.
 const TOLERANCE: i32 = 1;
 
-/// Chooses the disparity of each pixel, in pixels; NaN where there is none, or where the views disagree. `seen` states
-/// where the left and the right camera see whole windows.
-pub(super) fn winners(sums: &[u8], seen: [&[bool]; 2], hypotheses: &Hypotheses) -> Vec<f32> {
+/// Chooses the disparity of each pixel of some rows, the first of which and whose sums are given, in pixels; NaN where there is none, or where the views disagree.
+/// `disparities` are those of all rows. `seen` states where the left and the right camera see whole windows.
+pub(super) fn winners(
+    disparities: &mut [f32],
+    (top, sums): (usize, &[u8]),
+    seen: [&[bool]; 2],
+    hypotheses: &Hypotheses,
+) {
     let Hypotheses { width, count, ref first, .. } = *hypotheses;
-    let mut disparities = vec![0.0; first.len()];
-    disparities.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
-        let row = y * width..(y + 1) * width;
-        let sums = &sums[y * width * count..(y + 1) * width * count];
+    let rows = disparities[top * width..].par_chunks_mut(width).zip(sums.par_chunks(width * count));
+    rows.enumerate().for_each(|(y, (out, sums))| {
+        let row = (top + y) * width..(top + y + 1) * width;
         chosen(out, sums, &first[row.clone()], seen.map(|seen| &seen[row.clone()]));
     });
-    disparities
 }
 
 /// Chooses the disparities of one row.
