@@ -121,16 +121,15 @@ fn columns<P: Path>(
     for (scratch, y) in scratch.chunks_exact_mut(row).zip(rows.clone()) {
         costs.fill(scratch, y, left..left + down.len());
     }
-    let mut advance = |paths: &mut [P], y: usize| {
+    for (paths, y) in rows.clone().map(|y| (true, y)).chain(rows.clone().rev().map(|y| (false, y))) {
+        let paths = if paths { &mut *down } else { &mut *up };
         let first = &first[y * width + left..][..paths.len()];
         let y = y - rows.start;
         let cells = scratch[y * row..].chunks_exact(count).zip(sums[y].chunks_exact_mut(count));
         for ((path, first), (costs, sums)) in paths.iter_mut().zip(first).zip(cells) {
             path.advance(*first, costs, sums);
         }
-    };
-    rows.clone().for_each(|y| advance(down, y));
-    rows.clone().rev().for_each(|y| advance(up, y));
+    }
 }
 
 /// Counts through `range` and, after `None`, back again.
