@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::smoothing::Gaussian;
 
 /// An image of one floating-point value per pixel, by rows.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Plane {
     width: usize,
     height: usize,
@@ -176,7 +176,7 @@ fn taps<const N: usize>(mixed: &[f32; MIXED], columns: &[u32; N]) -> Option<[[f3
 }
 
 /// Smoothed planes of halved resolutions: position x of level l is 2^l x of level 0.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Pyramid {
     levels: Vec<Plane>,
 }

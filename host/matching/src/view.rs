@@ -79,6 +79,11 @@ impl<F: Frame> View<F> {
         buffers.flags.push(self.seen);
     }
 
+    /// Takes the brightness out, for its memory.
+    pub(crate) fn take_values(&mut self) -> Vec<f32> {
+        std::mem::take(&mut self.plane).into_values()
+    }
+
     /// The grid of the view.
     #[must_use]
     pub const fn grid(&self) -> &Grid {

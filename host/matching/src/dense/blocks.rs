@@ -8,7 +8,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::paths::{Paths, ROWS, along_columns, along_rows, upwards};
-use super::volume::{Costs, Hypotheses, give_back, memory};
+use super::volume::{Costs, Hypotheses};
+use crate::pool::{give_back, memory};
 
 /// Most sums of a block, in bytes; more rows than [`LEAST_ROWS`] have no more.
 const MOST_SUMS: usize = 8 << 20;

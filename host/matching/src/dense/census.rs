@@ -6,6 +6,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use crate::plane::Plane;
+use crate::pool::memory;
 
 /// Reach of the window along rows and columns: 9 × 7 pixels, whose 62 neighbours fit into 64 bits.
 pub(super) const REACH: [usize; 2] = [4, 3];
@@ -20,9 +21,10 @@ const BAND: usize = 32;
 /// Computes one word per pixel, with a bit set for every darker neighbour. The border is repeated outwards.
 pub(super) fn census(plane: &Plane) -> Vec<u64> {
     let (width, height) = (plane.width(), plane.height());
-    let mut words = vec![0; plane.values().len()];
+    let mut words = memory(plane.values().len());
     words.par_chunks_mut(width * BAND).enumerate().for_each(|(band, words)| {
         let first = band * BAND;
+        words.fill(0);
         // Row y of the image is row y - first + the reach here.
         let rows: Vec<Vec<f32>> = (first..first + words.len() / width + 2 * REACH[1])
             .map(|y| padded(plane.row(y.saturating_sub(REACH[1]).min(height - 1))))

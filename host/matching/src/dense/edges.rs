@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::levels::filled;
 use super::window::BAND;
+use crate::pool::memory;
 
 /// The reach of the windows in pixels.
 const WINDOW: usize = 4;
@@ -21,7 +22,7 @@ const ROUGHNESS: f32 = 0.25;
 /// beside them on their row.
 pub(super) fn steps(disparities: &[f32], seen: &[bool], width: usize) -> Vec<f32> {
     let height = disparities.len() / width;
-    let mut steps = vec![0.0; disparities.len()];
+    let mut steps = memory(disparities.len());
     steps.par_chunks_mut(BAND * width).enumerate().for_each(|(band, steps)| {
         let top = band * BAND;
         let rows = top.saturating_sub(WINDOW)..(top + steps.len() / width + WINDOW).min(height);

@@ -7,6 +7,7 @@ use super::edges::steps;
 use super::register::{Registration, SampledView};
 use super::support::isolated;
 use super::surface::{SAME_SURFACE, Surface};
+use crate::pool::give_back;
 
 /// Reach of the windows for smoothing and registration, in pixels of the view.
 const REACH: usize = 4;
@@ -40,6 +41,13 @@ pub struct Disparities {
     pub(super) other: Vec<f32>,
     /// Why a disparity is not used.
     pub(super) doubt: Vec<Option<Gap>>,
+}
+
+impl Drop for Disparities {
+    fn drop(&mut self) {
+        let Self { disparity, sigma, likeness, other, .. } = self;
+        [disparity, sigma, likeness, other].into_iter().for_each(|values| give_back(std::mem::take(values)));
+    }
 }
 
 /// Smooths and registers twice. The first pass brings slanted surfaces within the reach of the second. `area` is that of
@@ -77,6 +85,7 @@ pub(super) fn registered(views: [SampledView<'_>; 2], whole: Vec<f32>, area: usi
     sigma.par_iter_mut().zip(&roughness).zip(&steps).for_each(|((sigma, roughness), step)| {
         *sigma = sigma_of(*sigma, *roughness, *step);
     });
+    [trusted, roughness, steps].into_iter().for_each(give_back);
     Disparities { disparity, sigma, likeness, other, doubt }
 }
 

@@ -6,11 +6,12 @@ use vergence_vision::Frame;
 
 use super::blocks::summed;
 use super::census::{REACH, census};
-use super::volume::{CensusView, Costs, Hypotheses, LANES};
+use super::volume::{CensusView, Costs, Hypotheses, LANES, Reversed};
 use super::winner::winners;
 use crate::View;
 use crate::epipolar_band::EpipolarBand;
 use crate::plane::{Plane, Pyramid};
+use crate::pool::{give_back, memory};
 
 /// Largest number of pixels of the coarsest level.
 const COARSEST: usize = 400_000;
@@ -23,7 +24,8 @@ const REFINED: usize = LANES;
 #[derive(Clone, Debug)]
 pub(super) struct Levels {
     planes: [Pyramid; 2],
-    seen: [SeenTable; 2],
+    /// Whether the camera sees the whole census window of each pixel.
+    seen: [Vec<Vec<bool>>; 2],
     /// Largest disparity that is sought, in pixels of the finest level.
     largest: f64,
 }
@@ -33,10 +35,14 @@ impl Levels {
     pub(super) fn new<L: Frame, R: Frame>(left: &View<L>, right: &View<R>, band: &EpipolarBand) -> Self {
         let width = left.grid().size().0;
         let count = searched(left.plane()) + 1;
-        let (left_seen, right_seen) =
-            rayon::join(|| SeenTable::new(left.seen(), width), || SeenTable::new(right.seen(), width));
+        let planes = [left.plane(), right.plane()].map(|plane| in_memory(plane, count));
+        let seen = |seen: &[bool], planes: &Pyramid| -> Vec<Vec<bool>> {
+            let table = SeenTable::new(seen, width);
+            planes.levels().iter().enumerate().map(|(level, plane)| table.level(plane, 1 << level)).collect()
+        };
+        let (left_seen, right_seen) = rayon::join(|| seen(left.seen(), &planes[0]), || seen(right.seen(), &planes[1]));
         Self {
-            planes: [left.plane(), right.plane()].map(|plane| Pyramid::new(plane, count)),
+            planes,
             seen: [left_seen, right_seen],
             largest: (0..width).map(|x| band.largest_disparity(x as f64)).fold(0.0, f64::max),
         }
@@ -57,7 +63,10 @@ impl Levels {
                 None => self.all(level),
                 Some(disparities) => near(plane, disparities),
             };
-            coarser = Some(self.winners(level, &hypotheses));
+            let found = self.winners(level, hypotheses);
+            if let Some(coarser) = coarser.replace(found) {
+                give_back(coarser);
+            }
         }
         coarser.unwrap_or_default()
     }
@@ -66,7 +75,7 @@ impl Levels {
     /// the level comes first.
     pub(super) fn swept_coarsely(&self) -> (usize, Vec<f32>) {
         match self.count().checked_sub(1) {
-            Some(level) => (level, self.winners(level, &self.all(level))),
+            Some(level) => (level, self.winners(level, self.all(level))),
             None => (0, Vec::new()),
         }
     }
@@ -87,18 +96,45 @@ impl Levels {
     }
 
     /// The disparities among `hypotheses` on which both views agree.
-    fn winners(&self, level: usize, hypotheses: &Hypotheses) -> Vec<f32> {
-        let [left, right] = [0, 1].map(|side| {
+    fn winners(&self, level: usize, hypotheses: Hypotheses) -> Vec<f32> {
+        let Hypotheses { width, count, .. } = hypotheses;
+        let seen = self.seen.each_ref().map(|seen| &seen[level][..]);
+        let view = |side: usize| {
             let plane: &Plane = &self.planes[side].levels()[level];
-            CensusView { words: census(plane), seen: self.seen[side].level(plane, 1 << level) }
+            CensusView { words: census(plane), seen: seen[side] }
+        };
+        let right = view(1);
+        let reversed = Reversed::of(&right, width, count);
+        give_back(right.words);
+        let left = view(0);
+        let spans = left.spans(width);
+        let mut disparities = memory(hypotheses.first.len());
+        summed(&Costs::new(&left, &reversed, &hypotheses, &spans), |top, sums| {
+            winners(&mut disparities, (top, sums), seen, &hypotheses);
         });
-        let spans = left.spans(hypotheses.width);
-        let mut disparities = vec![f32::NAN; hypotheses.first.len()];
-        summed(&Costs::new([&left, &right], hypotheses, &spans), |top, sums| {
-            winners(&mut disparities, (top, sums), [&left.seen, &right.seen], hypotheses);
-        });
+        reversed.recycle();
+        give_back(left.words);
+        give_back(hypotheses.first);
         disparities
     }
+}
+
+impl Drop for Levels {
+    fn drop(&mut self) {
+        let mut buffers = Vec::new();
+        std::mem::take(&mut self.planes).into_iter().for_each(|planes| planes.recycle(&mut buffers));
+        buffers.into_iter().for_each(give_back);
+    }
+}
+
+/// A pyramid of `plane` in memory that was used before.
+fn in_memory(plane: &Plane, levels: usize) -> Pyramid {
+    let area = |level: usize| plane.width().div_ceil(1 << level) * plane.height().div_ceil(1 << level);
+    // The last is taken first.
+    let mut buffers = (0..levels).rev().map(|level| memory(area(level))).collect();
+    let pyramid = Pyramid::in_buffers(plane, levels, &mut buffers);
+    buffers.into_iter().for_each(give_back);
+    pyramid
 }
 
 /// The number of levels that are searched for the disparities of a plane.
@@ -109,7 +145,8 @@ fn searched(plane: &Plane) -> usize {
 /// The hypotheses of the coarsest level: every disparity up to `largest` at every pixel.
 fn all(plane: &Plane, largest: usize) -> Hypotheses {
     let count = (largest + 2 * BEYOND_INFINITY as usize + 1).next_multiple_of(LANES);
-    let first = vec![-BEYOND_INFINITY; plane.values().len()];
+    let mut first = memory(plane.values().len());
+    first.fill(-BEYOND_INFINITY);
     Hypotheses { width: plane.width(), height: plane.height(), count, first }
 }
 
@@ -117,7 +154,7 @@ fn all(plane: &Plane, largest: usize) -> Hypotheses {
 fn near(plane: &Plane, coarser: &[f32]) -> Hypotheses {
     let (width, height) = (plane.width(), plane.height());
     let coarser_width = width.div_ceil(2);
-    let mut first = vec![0; width * height];
+    let mut first = memory(width * height);
     first.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         let filled = filled(&coarser[(y / 2) * coarser_width..][..coarser_width]);
         for (x, first) in row.iter_mut().enumerate() {

@@ -45,8 +45,9 @@ use self::surface::SAME_SURFACE;
 use crate::epipolar_band::EpipolarBand;
 use crate::grid::direction;
 use crate::matcher::{ImagePair, MatchError};
-use crate::pool::in_pool;
+use crate::pool::{give_back, in_pool, memory};
 use crate::shared_field::near;
+use crate::view::Buffers;
 use crate::{Grid, SharedFrame, View, ViewPixel};
 
 /// Smallest disparity in standard deviations, lenses and pose included, that differs from zero.
@@ -108,8 +109,13 @@ impl<'a> DenseViews<'a> {
     fn turned(pair: &ImagePair<'a>, frame: SharedFrame, rows: Transform<Left, Right>) -> Result<Self, MatchError> {
         let axes = SharedFrame::new(&rows).ok_or(MatchError::NoBaseline)?;
         let grid = Grid::covering(&axes, pair.left_camera, pair.right_camera, 1.0).ok_or(MatchError::NoSharedField)?;
-        let left = View::masked((pair.left, pair.masks[0]), pair.left_camera, axes.shared_from_left(), grid);
-        let right = View::masked((pair.right, pair.masks[1]), pair.right_camera, axes.shared_from_right(), grid);
+        let (width, height) = grid.size();
+        let mut buffers = [Buffers::default(), Buffers::default()];
+        buffers.iter_mut().for_each(|buffers| buffers.values.push(memory(width * height)));
+        let [of_left, of_right] = &mut buffers;
+        let (left, right) = ((pair.left, pair.masks[0]), (pair.right, pair.masks[1]));
+        let left = View::in_buffers(left, pair.left_camera, axes.shared_from_left(), grid, of_left);
+        let right = View::in_buffers(right, pair.right_camera, axes.shared_from_right(), grid, of_right);
         let levels = Some(Levels::new(&left, &right, &band(&grid, &axes, pair.nearest)));
         Ok(Self { pair: *pair, frame, rows, rows_frame: axes, left, right, levels, row_matches: Vec::new() })
     }
@@ -130,8 +136,10 @@ impl<'a> DenseViews<'a> {
             let sightings = sightings(levels);
             views.row_matches = sightings.iter().filter_map(|it| views.in_originals(it)).collect();
             let pose = pose_of_rows(&sightings, views.left.grid(), &views.rows_frame, &views.rows);
-            let Some(moved) = pose.and_then(|pose| Self::turned(&views.pair, views.frame, pose).ok()) else { break };
-            views = Self { row_matches: views.row_matches, ..moved };
+            let moved = pose.and_then(|pose| Self::turned(&views.pair, views.frame, pose).ok());
+            let Some(mut moved) = moved else { break };
+            moved.row_matches = std::mem::take(&mut views.row_matches);
+            views = moved;
         }
         views
     }
@@ -266,6 +274,13 @@ impl<'a> DenseViews<'a> {
             left: rotation(&(self.frame.shared_from_left() * self.rows_frame.shared_from_left().inverse())),
             right: rotation(&(self.frame.shared_from_right() * self.rows_frame.shared_from_right().inverse())),
         })
+    }
+}
+
+impl Drop for DenseViews<'_> {
+    fn drop(&mut self) {
+        give_back(self.left.take_values());
+        give_back(self.right.take_values());
     }
 }
 

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::surface::SAME_PLANE;
 use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
 use crate::plane::{Plane, cubic_weights};
+use crate::pool::memory;
 
 /// Smallest number of pixels of a window.
 const LEAST: f32 = 16.0;
@@ -41,7 +42,7 @@ pub(super) struct Registration {
 impl Registration {
     /// Makes room for `count` pixels.
     pub(super) fn new(count: usize) -> Self {
-        Self { shift: vec![0.0; count], sigma: vec![0.0; count], likeness: vec![0.0; count] }
+        Self { shift: memory(count), sigma: memory(count), likeness: memory(count) }
     }
 
     /// Registers the right view to the left one around `disparity` (NaN where there is none). The windows extend `reach`

@@ -5,6 +5,7 @@ use multiversion::target::target_cfg_f;
 use rayon::prelude::*;
 
 use super::window::{BAND, LANES, Lanes, Padded, multiply_add};
+use crate::pool::memory;
 
 /// Largest difference in disparity, in pixels, of neighbours on one surface.
 pub(super) const SAME_SURFACE: f32 = 1.5;
@@ -27,7 +28,7 @@ pub(super) struct Surface {
 impl Surface {
     /// Makes room for `count` pixels.
     pub(super) fn new(count: usize) -> Self {
-        Self { disparity: vec![0.0; count], roughness: vec![0.0; count] }
+        Self { disparity: memory(count), roughness: memory(count) }
     }
 
     /// Fits planes in windows that extend `reach` pixels in each direction. `disparities` are NaN where there are none.

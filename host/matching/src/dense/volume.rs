@@ -2,12 +2,12 @@
 //! needed, which is faster than to read them from memory; only their sums make a volume.
 
 use std::ops::Range;
-use std::sync::{Mutex, PoisonError};
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::census::UNRELATED;
+use crate::pool::{give_back, memory};
 
 /// Number of hypotheses in a vector; volumes hold whole vectors.
 pub(super) const LANES: usize = 16;
@@ -23,13 +23,12 @@ pub(super) struct Hypotheses {
 }
 
 /// One view for the comparison: a census word for each pixel, and whether the camera sees its whole window.
-#[derive(Clone, Debug)]
-pub(super) struct CensusView {
+pub(super) struct CensusView<'a> {
     pub words: Vec<u64>,
-    pub seen: Vec<bool>,
+    pub seen: &'a [bool],
 }
 
-impl CensusView {
+impl CensusView<'_> {
     /// From the first to the last pixel of each row that is seen.
     pub(super) fn spans(&self, width: usize) -> Vec<Range<usize>> {
         let span = |row: &[bool]| {
@@ -40,44 +39,21 @@ impl CensusView {
     }
 }
 
-/// The largest volume that was used before. The system clears new memory page by page, which takes longer than the search in it.
-static SPARE: Mutex<Vec<u8>> = Mutex::new(Vec::new());
-
-/// Memory for a volume, with any values.
-pub(super) fn memory(count: usize) -> Vec<u8> {
-    // A poisoned lock only means that another thread panicked between whole volumes.
-    let mut volume = std::mem::take(&mut *SPARE.lock().unwrap_or_else(PoisonError::into_inner));
-    if volume.capacity() < count {
-        return vec![0; count];
-    }
-    volume.resize(count, 0);
-    volume
-}
-
-/// Keeps a volume for the next search.
-pub(super) fn give_back(volume: Vec<u8>) {
-    let mut spare = SPARE.lock().unwrap_or_else(PoisonError::into_inner);
-    if volume.capacity() > spare.capacity() {
-        *spare = volume;
-    }
-}
-
 /// Both views, ready for comparison.
 pub(super) struct Costs<'a> {
-    left: &'a CensusView,
-    right: Vec<Reversed>,
+    left: &'a CensusView<'a>,
+    right: &'a Reversed,
     hypotheses: &'a Hypotheses,
     spans: &'a [Range<usize>],
 }
 
 impl<'a> Costs<'a> {
-    pub(super) fn new(
-        [left, right]: [&'a CensusView; 2],
+    pub(super) const fn new(
+        left: &'a CensusView<'a>,
+        right: &'a Reversed,
         hypotheses: &'a Hypotheses,
         spans: &'a [Range<usize>],
     ) -> Self {
-        let rows = right.words.par_chunks(hypotheses.width).zip(right.seen.par_chunks(hypotheses.width));
-        let right = rows.map(|(words, seen)| Reversed::of(words, seen, hypotheses.count)).collect();
         Self { left, right, hypotheses, spans }
     }
 
@@ -101,12 +77,12 @@ impl<'a> Costs<'a> {
         out[..span.start * count].fill(0);
         out[span.end * count..].fill(0);
         let left = (&self.left.words[row.clone()], &self.left.seen[row.clone()]);
-        differences((out, span), columns.start, left, &self.right[y], &first[row]);
+        differences((out, span), columns.start, left, &self.right.row(y), &first[row]);
     }
 }
 
-/// A right row in reverse order, so that the index grows with the disparity, padded on both sides.
-struct Reversed {
+/// The right view with its rows in reverse order, so that the index grows with the disparity, padded on both sides.
+pub(super) struct Reversed {
     words: Vec<u64>,
     /// All bits set where the pixel is seen, no bit elsewhere.
     known: Vec<u8>,
@@ -115,18 +91,48 @@ struct Reversed {
 }
 
 impl Reversed {
-    fn of(words: &[u64], seen: &[bool], count: usize) -> Self {
-        let (width, margin) = (words.len(), count);
-        let mut reversed =
-            Self { words: vec![0; width + 2 * margin], known: vec![0; width + 2 * margin], width, margin };
-        for (x, (&word, &seen)) in words.iter().zip(seen).enumerate() {
-            let at = margin + width - 1 - x;
-            reversed.words[at] = word;
-            reversed.known[at] = if seen { u8::MAX } else { 0 };
-        }
-        reversed
+    /// Rows of `width` pixels, for `count` hypotheses.
+    pub(super) fn of(view: &CensusView<'_>, width: usize, count: usize) -> Self {
+        let (margin, stride) = (count, width + 2 * count);
+        let height = view.words.len() / width.max(1);
+        let (mut words, mut known) = (memory(stride * height), memory(stride * height));
+        let rows = words.par_chunks_mut(stride).zip(known.par_chunks_mut(stride));
+        let views = view.words.par_chunks(width).zip(view.seen.par_chunks(width));
+        rows.zip(views).for_each(|((words, known), (from, seen))| {
+            for margin in [0..margin, margin + width..stride] {
+                words[margin.clone()].fill(0);
+                known[margin].fill(0);
+            }
+            words[margin..].iter_mut().zip(from.iter().rev()).for_each(|(word, from)| *word = *from);
+            known[margin..].iter_mut().zip(seen.iter().rev()).for_each(|(known, seen)| {
+                *known = if *seen { u8::MAX } else { 0 };
+            });
+        });
+        Self { words, known, width, margin }
     }
 
+    fn row(&self, y: usize) -> ReversedRow<'_> {
+        let Self { width, margin, .. } = *self;
+        let row = y * (width + 2 * margin)..(y + 1) * (width + 2 * margin);
+        ReversedRow { words: &self.words[row.clone()], known: &self.known[row], width, margin }
+    }
+
+    /// Gives the memory back.
+    pub(super) fn recycle(self) {
+        give_back(self.words);
+        give_back(self.known);
+    }
+}
+
+/// A row of a [`Reversed`] view.
+struct ReversedRow<'a> {
+    words: &'a [u64],
+    known: &'a [u8],
+    width: usize,
+    margin: usize,
+}
+
+impl ReversedRow<'_> {
     /// The words, and whether they are known, of the partners of the left pixel x from disparity `first` on.
     #[inline(always)]
     fn partners(&self, x: usize, first: i32, count: usize) -> (&[u64], &[u8]) {
@@ -146,7 +152,7 @@ fn differences(
     (costs, span): (&mut [u8], Range<usize>),
     start: usize,
     (words, seen): (&[u64], &[bool]),
-    right: &Reversed,
+    right: &ReversedRow<'_>,
     first: &[i32],
 ) {
     let count = costs.len() / words.len().max(1);
