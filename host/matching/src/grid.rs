@@ -63,9 +63,12 @@ impl Grid {
 
     /// The index, by rows, of the pixel nearest to a position; `None` beyond the grid.
     pub(crate) fn index_nearest(&self, at: ViewPixel) -> Option<usize> {
-        let (x, y) = (at.x.round(), at.y.round());
-        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
-        inside.then_some(y as usize * self.width + x as usize)
+        let nearest = |at: f64, count: usize| {
+            let whole = at as u32;
+            let nearest = whole as usize + usize::from(at - f64::from(whole) >= 0.5);
+            (at > -0.5 && nearest < count).then_some(nearest)
+        };
+        Some(nearest(at.y, self.height)? * self.width + nearest(at.x, self.width)?)
     }
 
     /// Number of columns and rows.

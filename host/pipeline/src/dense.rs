@@ -55,9 +55,11 @@ pub fn dense_ranges(
         let mut views = views.aligned();
         let stated =
             StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-        let pose_drift = pose_drift(views.row_matches(), &stated, &expected_drift(pose));
         ended(Stage::Align);
-        let swept = views.sweep();
+        let matches = views.row_matches().to_vec();
+        // What the images say of the pose is for people: the search does not wait for it.
+        let drift = || pose_drift(&matches, &stated, &expected_drift(pose));
+        let (swept, pose_drift) = rayon::join(|| views.sweep(), drift);
         ended(Stage::Sweep);
         let disparities = views.register(swept);
         ended(Stage::Register);

@@ -239,21 +239,16 @@ impl<'a> DenseViews<'a> {
             return DenseSample::Far;
         }
         let other = disparities.other[index];
-        let between_surfaces = if other.is_nan() {
-            0.0
-        } else {
-            match at(other) {
-                (other, true) => f64::from(BETWEEN_SURFACES) * (other.mm - range.mm),
-                // The other surface may be anywhere far away.
-                (_, false) => return DenseSample::Gap(Gap::Edge),
-            }
-        };
-        DenseSample::Measured(DenseRange {
-            range_mm: range.mm as f32,
-            sigma_mm: range.sigma_mm.hypot(between_surfaces) as f32,
-            own_sigma_mm: range.own_sigma_mm.hypot(between_surfaces) as f32,
-            confidence: disparities.likeness[index],
-        })
+        let mut sigmas = [range.sigma_mm, range.own_sigma_mm];
+        if !other.is_nan() {
+            // The other surface may be anywhere far away.
+            let (other, true) = at(other) else { return DenseSample::Gap(Gap::Edge) };
+            let between_surfaces = f64::from(BETWEEN_SURFACES) * (other.mm - range.mm);
+            sigmas = sigmas.map(|sigma| sigma.hypot(between_surfaces));
+        }
+        let [sigma_mm, own_sigma_mm] = sigmas.map(|sigma| sigma as f32);
+        let confidence = disparities.likeness[index];
+        DenseSample::Measured(DenseRange { range_mm: range.mm as f32, sigma_mm, own_sigma_mm, confidence })
     }
 
     /// The reason why there is no disparity at a position of the left view.
