@@ -43,7 +43,7 @@ pub(crate) fn memory<T: Kept>(count: usize) -> Vec<T> {
     let places = shelf.iter().enumerate().map(|(place, vector)| (vector.capacity(), place));
     let fitting = places.clone().filter(|(capacity, _)| (count..=2 * count).contains(capacity)).min();
     if let Some((_, place)) = fitting {
-        let mut vector = shelf.swap_remove(place);
+        let mut vector = shelf.remove(place);
         drop(shelf);
         vector.resize(count, T::default());
         return vector;
@@ -51,7 +51,7 @@ pub(crate) fn memory<T: Kept>(count: usize) -> Vec<T> {
     // Views have grown: that of their size before is not asked for any more.
     let outgrown = places.filter(|(capacity, _)| (count / 2..count).contains(capacity)).max();
     if let Some((_, place)) = outgrown {
-        shelf.swap_remove(place);
+        shelf.remove(place);
     }
     drop(shelf);
     vec![T::default(); count]
@@ -60,7 +60,9 @@ pub(crate) fn memory<T: Kept>(count: usize) -> Vec<T> {
 /// Keeps a vector for the next one who needs [`memory`].
 pub(crate) fn give_back<T: Kept>(vector: Vec<T>) {
     let mut shelf = unused::<T>();
-    if shelf.len() < MOST_KEPT && vector.capacity() > 0 {
-        shelf.push(vector);
+    shelf.push(vector);
+    if shelf.len() > MOST_KEPT {
+        // Views of other sizes came meanwhile: the first one has not been asked for for longest.
+        shelf.remove(0);
     }
 }
