@@ -23,6 +23,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 
 use super::SchurNormal;
+use super::normal::determined;
 
 /// How much of the estimate a single view may determine in some direction before its pull there no longer counts as known.
 const MOST_LEVERAGE: f64 = 0.99;
@@ -83,7 +84,7 @@ impl<const B: usize> SchurNormal<B> {
     fn whiten(&self) -> Option<DMatrix<f64>> {
         let information = self.shared_information()?;
         let scale = DMatrix::from_diagonal(&information.diagonal().map(|d| 1.0 / d.sqrt()));
-        Cholesky::new(&scale * &information * &scale)?.l().solve_lower_triangular(&scale)
+        determined(&scale * &information * &scale)?.l().solve_lower_triangular(&scale)
     }
 
     fn pull(&self, block: usize, whiten: &DMatrix<f64>) -> Option<Pull> {

@@ -319,6 +319,15 @@ fn invert_scaled(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return (n == 0).then(|| matrix.clone());
     }
     let unit = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let inverse = Cholesky::new(unit)?.inverse();
+    let inverse = determined(unit)?.inverse();
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+/// The factor of an information with ones on its diagonal; `None` where only rounding parts it from a singular one. The square of an element on
+/// the factor's diagonal is the part of an unknown that those before it do not tell: rounding leaves some 1e-15 of it where they tell all.
+pub(super) fn determined(unit: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    const SINGULAR: f64 = 1e-12;
+    let factor = Cholesky::new(unit)?;
+    let is_told = factor.l_dirty().diagonal().iter().all(|own| own * own > SINGULAR);
+    is_told.then_some(factor)
 }
