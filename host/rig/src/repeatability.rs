@@ -17,7 +17,12 @@ impl Repeatability {
     /// The covariance (6 × 6) of the relative pose by it, in the coordinates of [`crate::RigPose::covariance`].
     #[must_use]
     pub fn covariance(&self) -> Matrix6<f64> {
-        let (turn, shift) = (self.rotation.rad().powi(2), self.translation.mm().powi(2));
-        Matrix6::from_diagonal(&[turn, turn, turn, shift, shift, shift].into())
+        of_components(self.rotation, self.translation)
     }
+}
+
+/// The covariance of a pose whose components have these standard deviations, each by itself.
+pub(crate) fn of_components(rotation: Angle, translation: Length) -> Matrix6<f64> {
+    let (turn, shift) = (rotation.rad().powi(2), translation.mm().powi(2));
+    Matrix6::from_diagonal(&[turn, turn, turn, shift, shift, shift].into())
 }

@@ -176,10 +176,10 @@ impl<const B: usize> SchurNormal<B> {
     /// The information and the gradient of the shared unknowns by small block `index` alone, its own unknowns eliminated. `None`
     /// where it is singular.
     pub(super) fn eliminated(&self, index: usize) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let SmallBlock { part, matrix, .. } = self.blocks.get(index)?;
-        let n = part.shared.nrows();
+        let block = self.blocks.get(index)?;
+        let (part, n) = (&block.part, block.part.shared.nrows());
         let mut taken = Products::new(n + 1);
-        self.blocks.get(index)?.eliminate(&Cholesky::new(*matrix)?, &mut taken)?;
+        block.eliminate(&Cholesky::new(block.matrix)?, &mut taken)?;
         taken.sum();
         let information = DMatrix::from_fn(n, n, |i, j| part.shared[(i, j)] - taken.at(i, j));
         Some((information, DVector::from_fn(n, |i, _| part.shared_gradient[i] - taken.at(i, n))))

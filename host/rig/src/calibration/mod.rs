@@ -4,12 +4,13 @@ mod lenses;
 mod number;
 mod table;
 
-use nalgebra::{DMatrix, Matrix6, Matrix6xX, SMatrix};
+use nalgebra::{DMatrix, Matrix6xX, SMatrix};
 use vergence_vision::{Angle, LENS_PARAMETERS, Length, SHARED_PARAMETERS, SharedCovariance, Side};
 
 pub use self::lenses::UnknownLensErrors;
 pub use self::number::RigNumber;
 pub(crate) use self::table::{CalibrationTables, SigmaFile};
+use crate::repeatability::of_components;
 use crate::rig::Rig;
 
 /// How far the numbers of a rig may be off.
@@ -135,9 +136,7 @@ impl Rig {
         match &self.calibration {
             RigCalibration::Unknown => SharedCovariance::exact(),
             RigCalibration::Sigmas { rotation, translation } => {
-                let (turn, shift) = (rotation.rad().powi(2), translation.mm().powi(2));
-                SharedCovariance::exact()
-                    .with_pose(&Matrix6::from_diagonal(&[turn, turn, turn, shift, shift, shift].into()))
+                SharedCovariance::exact().with_pose(&of_components(*rotation, *translation))
             }
             RigCalibration::Covariance(found) => {
                 let by_numbers = self.shared_by_numbers(found.numbers(), left, right);
