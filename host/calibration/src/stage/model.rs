@@ -37,10 +37,9 @@ impl Model {
         readings.iter().zip(errors).map(|(reading, error)| reading + error).collect()
     }
 
-    /// The same stage with returns to its poses that are off by these standard deviations.
+    /// The same stage, whose returns are exact, with returns to its poses that are off by these standard deviations.
     pub fn with_returns(&self, return_sigma: [f64; 2]) -> Self {
-        let is_other = |unknown: &Unknown| !matches!(unknown, Unknown::Return { .. });
-        let mut unknowns: Vec<Unknown> = self.unknowns.iter().copied().filter(is_other).collect();
+        let mut unknowns = self.unknowns.clone();
         unknowns.extend((0..self.readings.len()).flat_map(|pose| [Unknown::Return { pose }; POSE]));
         Self { unknowns, return_sigma: Some(return_sigma), ..self.clone() }
     }
