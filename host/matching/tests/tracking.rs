@@ -11,6 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use rendered::{CORRIDOR_HUMAN, HUMAN, Place, Rendered};
 use vergence_matching::{GuidedMatcher, ImagePair, Match, Matcher, TrackingMatcher};
+use vergence_scene::Scene;
 use vergence_vision::{Angle, Left, Point, World};
 
 const SIDE: u32 = 320;
@@ -37,19 +38,19 @@ fn pair(truth: &Rendered) -> ImagePair<'_> {
 }
 
 /// The point in the scene that the left pixel of a match shows.
-fn shown(place: &Place, truth: &Rendered, found: &Match) -> Option<Point<World>> {
-    let (scene, world_from_left) = ((place.scene)(), place.world_from_left());
+fn shown(place: &Place, scene: &Scene, truth: &Rendered, found: &Match) -> Option<Point<World>> {
+    let world_from_left = place.world_from_left();
     let ray = world_from_left * truth.camera.unproject::<Left>(found.left).ok()?;
     let range = scene.cast(&world_from_left.origin(), &ray)?.range;
     Some(Point::from_mm(world_from_left.origin().mm() + ray.vector() * range.mm()))
 }
 
 /// Whether the right pixel shows what the left pixel, or one beside it at an edge, shows.
-fn is_right(place: &Place, truth: &Rendered, found: &Match) -> bool {
+fn is_right(place: &Place, scene: &Scene, truth: &Rendered, found: &Match) -> bool {
     [(0.0, 0.0), (0.8, 0.0), (-0.8, 0.0), (0.0, 0.8), (0.0, -0.8)].into_iter().any(|(du, dv)| {
         let beside = Match { left: vergence_vision::Pixel { u: found.left.u + du, v: found.left.v + dv }, ..*found };
         let range = |point: Point<World>| (point.mm() - place.world_from_left().origin().mm()).norm();
-        let Some(range) = shown(place, truth, &beside).map(range) else { return false };
+        let Some(range) = shown(place, scene, truth, &beside).map(range) else { return false };
         let ray = truth.camera.unproject::<Left>(found.left).unwrap();
         let there = truth.camera.project_point(&(truth.left_from_right.inverse() * ray.at(range)));
         there.is_ok_and(|there| (there.u - found.right.u).hypot(there.v - found.right.v) <= RIGHT_PX)
@@ -77,19 +78,20 @@ impl Counts {
         let (tracking, alone) = (TrackingMatcher::default(), GuidedMatcher::default());
         let mut first: BTreeMap<u64, Point<World>> = BTreeMap::new();
         let mut before: Vec<(u64, Point<World>)> = Vec::new();
+        let scene = (place(seed, 0.0).scene)();
         for (number, &separation) in separations_deg.iter().enumerate() {
             let place = place(seed, separation);
             let truth = place.rendered(SIDE, 100 * seed + number as u64);
             let found = tracking.find(&pair(&truth)).unwrap().pairs;
             self.matches += found.len();
-            self.right += found.iter().filter(|found| is_right(&place, &truth, found)).count();
+            self.right += found.iter().filter(|found| is_right(&place, &scene, &truth, found)).count();
             if number % 6 == 0 {
                 let found = alone.find(&pair(&truth)).unwrap().pairs;
-                let right = found.iter().filter(|found| is_right(&place, &truth, found)).count();
+                let right = found.iter().filter(|found| is_right(&place, &scene, &truth, found)).count();
                 self.alone = [self.alone[0] + right, self.alone[1] + found.len()];
             }
             let now: Vec<(u64, Point<World>)> =
-                found.iter().filter_map(|found| Some((found.track?, shown(&place, &truth, found)?))).collect();
+                found.iter().filter_map(|found| Some((found.track?, shown(&place, &scene, &truth, found)?))).collect();
             let numbers: BTreeSet<u64> = now.iter().map(|(track, _)| *track).collect();
             let left_from_world = place.world_from_left().inverse();
             for (track, point) in before.iter().filter(|(_, point)| sees(&truth, &(left_from_world * *point))) {
