@@ -15,7 +15,7 @@ use common::{fails_with, run_json};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use serde_json::Value;
 use vergence_rig::{BENCH_TOML, Rig};
-use vergence_vision::{KannalaBrandt, Left, Pixel, Point, Transform};
+use vergence_vision::{KannalaBrandt, Left, Pixel, Point, Right, Transform};
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
@@ -76,12 +76,19 @@ fn target(rig: &Rig, at: [f64; 2], dice: &mut Dice) -> Vec<Vector3<f64>> {
     (0..54).map(|i| centre + rotation * corner(i)).collect()
 }
 
-/// Corners and readings of `views` targets at each of `poses` (millimetres and radians).
+/// Corners and readings of `views` targets at each of `poses` (millimetres and radians), of a stage that returns exactly.
 fn csv(rig: &Rig, poses: &[[f64; 2]], views: usize) -> String {
+    returning_csv(rig, poses, views, [0.0; 2])
+}
+
+/// The same of a stage that comes to each pose a little beside it, turned and shifted by so many radians and millimetres, as standard deviations.
+fn returning_csv(rig: &Rig, poses: &[[f64; 2]], views: usize, [turned, shifted]: [f64; 2]) -> String {
     let mut text = String::from("camera,file,frame,idx,x,y,bx_mm,by_mm,baseline_mm,separation_deg\n");
-    let (mut dice, mut frame) = (Dice(7), 0);
+    let (mut dice, mut frame, mut beside) = (Dice(7), 0, Dice(11));
     for &at in poses {
-        let left_from_right: Transform<Left, _> = rig.pose_at_values(&at).left_from_right;
+        let [turn, shift] = [turned, shifted].map(|sigma| Vector3::from_fn(|_, _| sigma * beside.normal()));
+        let beside: Transform<Right, Right> = Transform::new(UnitQuaternion::from_scaled_axis(turn), shift);
+        let left_from_right: Transform<Left, Right> = rig.pose_at_values(&at).left_from_right * beside;
         let mut taken = 0;
         while taken < views {
             let target = target(rig, at, &mut dice);
@@ -152,6 +159,26 @@ fn recorded_corners_give_a_rig_file_for_every_pose() {
     // Every verb takes it.
     let home = run_json(&["--rig", &out, "--port", "sim", "home", "--json"]);
     assert_eq!(home["referenced"], serde_json::json!([true, true]));
+}
+
+#[test]
+fn a_stage_that_does_not_return_exactly_says_so_in_its_file() {
+    let work = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| work.path().join(name).to_string_lossy().into_owned();
+    let (corners, out) = (file("corners.csv"), file("rig.toml"));
+    let calibrated = |returns: [f64; 2]| {
+        std::fs::write(&corners, returning_csv(&as_built(), &SIX, 12, returns)).expect("written");
+        run_json(&["calibrate", "stage", "--json", "--csv", &corners, "--out", &out]);
+        let text = std::fs::read_to_string(&out).expect("a rig file");
+        Rig::from_toml(&text).expect("a rig").repeatability
+    };
+    let returns = [0.05_f64.to_radians(), 0.05];
+    let found = calibrated(returns).expect("it returns differently each time");
+    println!("{found:?}");
+    // Six poses, three components each.
+    assert!((0.4..2.0).contains(&(found.rotation.rad() / returns[0])), "{found:?}");
+    assert!((0.4..2.0).contains(&(found.translation.mm() / returns[1])), "{found:?}");
+    assert_eq!(calibrated([0.0; 2]), None);
 }
 
 #[test]

@@ -112,6 +112,13 @@ impl Part {
         }
     }
 
+    /// Information and gradient of the shared unknowns, less what small blocks have `taken` of them by their own.
+    fn less(&self, taken: &Products) -> (DMatrix<f64>, DVector<f64>) {
+        let n = self.shared.nrows();
+        let information = DMatrix::from_fn(n, n, |i, j| self.shared[(i, j)] - taken.at(i, j));
+        (information, DVector::from_fn(n, |i, _| self.shared_gradient[i] - taken.at(i, n)))
+    }
+
     fn add(&mut self, other: &Self) {
         self.shared += &other.shared;
         self.shared_gradient += &other.shared_gradient;
@@ -181,8 +188,7 @@ impl<const B: usize> SchurNormal<B> {
         let mut taken = Products::new(n + 1);
         block.eliminate(&Cholesky::new(block.matrix)?, &mut taken)?;
         taken.sum();
-        let information = DMatrix::from_fn(n, n, |i, j| part.shared[(i, j)] - taken.at(i, j));
-        Some((information, DVector::from_fn(n, |i, _| part.shared_gradient[i] - taken.at(i, n))))
+        Some(part.less(&taken))
     }
 
     /// ½ Σ ρ(‖r‖²).
@@ -252,7 +258,7 @@ impl<const B: usize> SchurNormal<B> {
             block.eliminate(&Cholesky::new(block.matrix)?, &mut taken)?;
         }
         taken.sum();
-        Some(DMatrix::from_fn(n, n, |i, j| self.whole.shared[(i, j)] - taken.at(i, j)))
+        Some(self.whole.less(&taken).0)
     }
 
     /// The marginal covariance of the shared step for unit variance of a residual component: multiply by
@@ -292,9 +298,8 @@ impl<const B: usize> SchurNormal<B> {
             blocks.push(factor);
         }
         taken.sum();
-        let mut schur = DMatrix::from_fn(n, n, |i, j| self.whole.shared[(i, j)] - taken.at(i, j));
+        let (mut schur, gradient) = self.whole.less(&taken);
         (0..n).for_each(|i| schur[(i, i)] += damping * damped_diagonal(self.whole.shared[(i, i)]));
-        let gradient = DVector::from_fn(n, |i, _| self.whole.shared_gradient[i] - taken.at(i, n));
         let shared = if n > 0 { Some(Cholesky::new(schur)?) } else { None };
         Some(Reduced { shared, gradient, blocks })
     }

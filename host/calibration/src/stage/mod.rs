@@ -164,14 +164,8 @@ pub fn calibrate_stage(rig: &Rig, poses: &[StagePose], options: &StageOptions) -
         model.reading_sigma = reading_sigma;
         fit = fitting.fit(&model, fitting.again(&fit))?;
     }
-    if fit.covariance.as_ref().is_some_and(|found| found.scatter > MOST_SCATTER) {
-        let mut free = Model { reading_sigma: stated.clone(), ..model.with_returns(FREE_RETURNS) };
-        let freed = fitting.fit(&free, fitting.again(&fit))?;
-        if let Some((reading_sigma, return_sigma)) = play::sigma_of_returns(&free, &freed, &stated) {
-            (free.reading_sigma, free.return_sigma) = (reading_sigma, Some(return_sigma));
-            fit = fitting.fit(&free, fitting.again(&freed))?;
-            model = free;
-        }
+    if let Some(returning) = fitting.with_returns(&model, &stated, &fit) {
+        (model, fit) = returning;
     }
     let observability = observability::observability(rig, &model, &fit, &alone);
     result::calibration(result::Material {
@@ -193,6 +187,18 @@ struct Fitting<'a> {
 }
 
 impl Fitting<'_> {
+    /// The mechanism that comes back to its poses a little differently each time, where views scatter by more than their noise and show it to.
+    /// `None` where they do not, or where it cannot be fitted once it is free: what was fitted before stands.
+    fn with_returns(&self, model: &Model, stated: &[f64], fit: &Fit<State>) -> Option<(Model, Fit<State>)> {
+        fit.covariance.as_ref().filter(|found| found.scatter > MOST_SCATTER)?;
+        let mut free = Model { reading_sigma: stated.to_vec(), ..model.with_returns(FREE_RETURNS) };
+        let freed = self.fit(&free, self.again(fit)).ok()?;
+        let (reading_sigma, return_sigma) = play::sigma_of_returns(&free, &freed, stated)?;
+        (free.reading_sigma, free.return_sigma) = (reading_sigma, Some(return_sigma));
+        let fit = self.fit(&free, self.again(&freed)).ok()?;
+        Some((free, fit))
+    }
+
     fn fit(&self, model: &Model, start: Start<State>) -> Result<Fit<State>, StageError> {
         let task = Task {
             kinematics: model,
