@@ -15,7 +15,7 @@ use crate::blur::spread;
 use crate::bundle::{Bundle, Found};
 use crate::lens::Lens;
 use crate::optics::encoded;
-use crate::rays::{PosedLens, RayGrid};
+use crate::rays::{PosedLens, RayGrid, directions_of_all};
 use crate::render::{Rows, View, lattice};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
@@ -51,11 +51,7 @@ impl RayTable {
     #[must_use]
     pub fn new(lens: &dyn Lens, optics: &Optics) -> Self {
         let (size, lens_rays) = (lens.size(), lens.rays());
-        let row = |y: u32| -> Vec<[f64; 2]> {
-            (0..size.width + 2).map(|x| [f64::from(x) - 1.0, f64::from(y) - 1.0]).collect()
-        };
-        let rays: Vec<_> =
-            (0..size.height + 2).into_par_iter().flat_map_iter(|y| lens_rays.directions(&row(y))).collect();
+        let rays = directions_of_all(size, &lens_rays);
         let of_ray = |ray: &[f64; 3]| {
             let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
             PixelOptics {

@@ -1,9 +1,8 @@
 //! The rays of pixels and of points between them, without solving the lens equation for each.
 
-use std::borrow::Cow;
-
 use nalgebra::{Matrix3, Vector3};
-use vergence_vision::{Angle, Camera, Pixel, Transform, World};
+use rayon::prelude::*;
+use vergence_vision::{Angle, Camera, ImageSize, Pixel, Transform, World};
 
 use crate::lens::{Lens, LensRays};
 
@@ -17,14 +16,12 @@ pub struct PosedLens<'a> {
     origin: Vector3<f64>,
 }
 
-/// The rays of the pixel centres of a rectangle and of their neighbours, in the world.
+/// The rays of the pixel centres of an image and of their neighbours, in the world.
 pub struct RayGrid<'a> {
     posed: &'a PosedLens<'a>,
-    left: u32,
-    top: u32,
     stride: usize,
     /// One row above to one row below; each from one column left to one column right. NaN outside the field.
-    rays: Cow<'a, [[f64; 3]]>,
+    rays: &'a [[f64; 3]],
 }
 
 /// A pixel's ray and its neighbours'.
@@ -77,24 +74,23 @@ impl<'a> PosedLens<'a> {
     }
 }
 
+/// The directions of the light of all pixels of an image and of one more on every side, row by row, in the camera's frame; not numbers outside
+/// the field. A true lens searches each of them.
+pub fn directions_of_all(size: ImageSize, rays: &LensRays<'_>) -> Vec<[f64; 3]> {
+    let row =
+        |y: u32| -> Vec<[f64; 2]> { (0..size.width + 2).map(|x| [f64::from(x) - 1.0, f64::from(y) - 1.0]).collect() };
+    (0..size.height + 2).into_par_iter().flat_map_iter(|y| rays.directions(&row(y))).collect()
+}
+
 impl<'a> RayGrid<'a> {
-    /// For the rectangle of `columns` and `rows` whose first pixel is in column `left` and row `top`.
-    pub fn new(posed: &'a PosedLens<'a>, [left, top]: [u32; 2], [columns, rows]: [u32; 2]) -> Self {
-        let pixels: Vec<[f64; 2]> = (0..rows + 2)
-            .flat_map(|row| (0..columns + 2).map(move |column| (column, row)))
-            .map(|(column, row)| [f64::from(left) + f64::from(column) - 1.0, f64::from(top) + f64::from(row) - 1.0])
-            .collect();
-        Self { posed, left, top, stride: columns as usize + 2, rays: Cow::Owned(posed.rays.directions(&pixels)) }
-    }
-
-    /// For the whole image of `columns`, whose rays in the camera's frame were computed before, with one pixel more on every side.
+    /// For the whole image of `columns` with the rays of [`directions_of_all`].
     pub const fn of_table(posed: &'a PosedLens<'a>, rays: &'a [[f64; 3]], columns: u32) -> Self {
-        Self { posed, left: 0, top: 0, stride: columns as usize + 2, rays: Cow::Borrowed(rays) }
+        Self { posed, stride: columns as usize + 2, rays }
     }
 
-    /// The ray of a pixel of the rectangle; `None` outside the field.
+    /// The ray of a pixel; `None` outside the field.
     pub fn around(&'a self, x: u32, y: u32) -> Option<Around<'a>> {
-        let middle = ((y - self.top) as usize + 1) * self.stride + (x - self.left) as usize + 1;
+        let middle = (y as usize + 1) * self.stride + x as usize + 1;
         let centre = self.posed.in_world(&self.rays[middle])?;
         Some(Around { grid: self, pixel: Pixel { u: f64::from(x), v: f64::from(y) }, middle, centre })
     }
@@ -156,7 +152,8 @@ mod tests {
         let pose = Transform::new(UnitQuaternion::from_euler_angles(0.3, -1.1, 0.2), Vector3::zeros());
         let rays = camera.rays();
         let posed = PosedLens::new(&camera, &rays, &pose);
-        let grid = RayGrid::new(&posed, [0, 300], [640, 40]);
+        let of_pixels = directions_of_all(size, &rays);
+        let grid = RayGrid::of_table(&posed, &of_pixels, size.width);
         for (x, y) in [(321, 318), (100, 320), (15, 310), (620, 339), (400, 300)] {
             let nearby = grid.around(x, y).unwrap().nearby();
             for offset in [[0.0, 0.0], [0.5, -0.5], [1.4, 1.1], [-2.0, 0.3]] {

@@ -10,7 +10,7 @@ use crate::bundle::Bundle;
 use crate::lens::{Lens, LensRays};
 use crate::optics::unit_pair;
 use crate::outlook::Outlook;
-use crate::rays::{Around, PosedLens, RayGrid};
+use crate::rays::{Around, PosedLens, RayGrid, directions_of_all};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 use crate::trace::NOTHING;
@@ -105,11 +105,12 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     let seed_of = |x: usize, y: usize| mix64(mix64(seed) ^ (y * width + x) as u64);
     let pixels = size.width as usize * size.height as usize;
 
-    let rays = view.camera.rays();
+    let lens = view.camera.rays();
+    let rays = Rays { lens: &lens, of_pixels: &directions_of_all(size, &lens) };
     let outlook = rows.outlook(view);
     let samples = view.optics.samples;
     let mut firsts = vec![First::default(); pixels];
-    for_each_row(view, rows, &rays, &mut firsts, |firsts, here, grid, y| {
+    for_each_row(view, rows, rays, &mut firsts, |firsts, here, grid, y| {
         let (mut centres, mut around_them) = (Bundle::default(), Bundle::default());
         for (x, first) in firsts.iter_mut().enumerate() {
             let Some(around) = grid.around(x as u32, y as u32) else { continue };
@@ -143,7 +144,7 @@ fn photograph(view: &View<'_>, seed: u64, rows: Rows<'_>) -> Photograph {
     });
 
     let mut light = vec![[0.0; 3]; pixels];
-    for_each_row(view, rows, &rays, &mut light, |light, _, grid, y| {
+    for_each_row(view, rows, rays, &mut light, |light, _, grid, y| {
         let mut edges = Bundle::default();
         let mut more = vec![LightSamples::default(); width];
         for (x, more) in more.iter_mut().enumerate().filter(|(x, _)| is_edge(&firsts, width, *x, y)) {
@@ -239,11 +240,18 @@ impl LightSamples {
     }
 }
 
+/// The lens made ready, and what [`directions_of_all`] gives of it.
+#[derive(Clone, Copy)]
+struct Rays<'a> {
+    lens: &'a LensRays<'a>,
+    of_pixels: &'a [[f64; 3]],
+}
+
 /// Calls `visit(row of items, view, rays, y)`, the view as at that row, for the rows of the view, in parallel.
 fn for_each_row<T: Send>(
     view: &View<'_>,
     rows: Rows<'_>,
-    lens: &LensRays<'_>,
+    rays: Rays<'_>,
     items: &mut [T],
     visit: impl Fn(&mut [T], &View<'_>, &RayGrid<'_>, usize) + Sync,
 ) {
@@ -251,9 +259,9 @@ fn for_each_row<T: Send>(
     items.par_chunks_mut(width * rows.at_once).enumerate().for_each(|(number, items)| {
         let top = number * rows.at_once;
         let here = rows.view(view, top as u32);
-        let posed = PosedLens::new(view.camera, lens, &here.world_from_camera);
-        let rays = RayGrid::new(&posed, [0, top as u32], [width, items.len() / width].map(|n| n as u32));
-        items.chunks_mut(width).enumerate().for_each(|(row, items)| visit(items, &here, &rays, top + row));
+        let posed = PosedLens::new(view.camera, rays.lens, &here.world_from_camera);
+        let grid = RayGrid::of_table(&posed, rays.of_pixels, view.camera.size().width);
+        items.chunks_mut(width).enumerate().for_each(|(row, items)| visit(items, &here, &grid, top + row));
     });
 }
 
