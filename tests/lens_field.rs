@@ -20,8 +20,8 @@ use image::RgbImage;
 use nalgebra::Vector3;
 use serde_json::Value;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
-use vergence_rig::{Provenance, Rig, RigCalibration};
-use vergence_vision::{KannalaBrandt, Kernel, Left, LensField, Pixel, PixelPair, Point};
+use vergence_rig::{LensField, Provenance, Rig, RigCalibration};
+use vergence_vision::{KannalaBrandt, Kernel, Left, Pixel, PixelPair, Point};
 
 const MATCH_PX: f64 = 0.03;
 /// Angle to the axis to which the middle of a target is held, in radians: the lenses are measured to some 56°.

@@ -118,7 +118,7 @@ impl Lens for KannalaBrandt {
         }
         let mut part = self.to_opencv();
         (part.cx, part.cy) = (part.cx - f64::from(left), part.cy - f64::from(top));
-        let part = Self::from_opencv(part, self.theta_max(), size).ok()?;
+        let part = Self::from_opencv_with(part, self.further_terms(), self.theta_max(), size).ok()?;
         part.with_pupil(self.pupil()).ok()?.with_asymmetry(self.asymmetry()).ok().map(TrueLens::Ideal)
     }
 }

@@ -156,6 +156,7 @@ fn all() -> Result<Vec<(&'static str, KannalaBrandt)>, BenchError> {
     let own = KannalaBrandt::new(k, 1.01, centre, Angle::from_deg(98.0), SIZE).map_err(|error| refused(&error))?;
     let by = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4] };
     let displaced = own.with_asymmetry(by).map_err(|error| refused(&error))?;
+    let longer = own.with_further_terms([4e-5, -3e-6]).map_err(|error| refused(&error))?;
     let pupil = Pupil::from_mm([2.77, 0.056]);
     let moving = |lens: KannalaBrandt| lens.with_pupil(pupil).map_err(|error| refused(&error));
     let mut all = vec![
@@ -163,6 +164,8 @@ fn all() -> Result<Vec<(&'static str, KannalaBrandt)>, BenchError> {
         ("polynomial, moving pupil", moving(own)?),
         ("polynomial, displaced", displaced),
         ("polynomial, displaced, moving pupil", moving(displaced)?),
+        ("polynomial of seven terms", longer),
+        ("polynomial of seven terms, moving pupil", moving(longer)?),
     ];
     for (name, model) in models()? {
         let size = if name == "OCamCalib" { SMALL } else { SIZE };

@@ -135,8 +135,7 @@ impl Cell {
 
     /// Area in the image if the sensor showed all of the cell, in square pixels.
     fn full_area(&self, lens: &KannalaBrandt) -> f64 {
-        let k = lens.k();
-        let radius = |t: f64| k.iter().rev().fold(0.0, |sum, k| sum * t * t + k) * t;
+        let radius = |t: f64| lens.radius(Angle::from_rad(t));
         let squares = radius(self.theta[1]).powi(2) - radius(self.theta[0]).powi(2);
         0.5 * (self.phi[1] - self.phi[0]) * squares * lens.aspect()
     }

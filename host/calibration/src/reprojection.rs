@@ -45,7 +45,7 @@ impl Lens {
     pub fn camera(&self, like: &KannalaBrandt) -> Result<KannalaBrandt, InvalidLens> {
         match self.0.camera(like.theta_max(), like.size()) {
             Err(InvalidLens::TurnsOver { .. }) => {
-                self.0.camera(self.0.central.largest_theta(like.size())?, like.size())
+                self.0.camera(self.0.central.largest_theta_with(self.0.further, like.size())?, like.size())
             }
             made => made,
         }

@@ -71,8 +71,8 @@ mod tests {
 
     use image::Rgb;
     use nalgebra::DMatrix;
-    use vergence_rig::{BENCH_TOML, CalibratedNumbers, RigCalibration, RigNumber};
-    use vergence_vision::{Angle, BodyMask, LensField};
+    use vergence_rig::{BENCH_TOML, CalibratedNumbers, LensField, RigCalibration, RigNumber};
+    use vergence_vision::{Angle, BodyMask};
 
     use super::*;
 

@@ -63,9 +63,9 @@ pub fn image(stamp_ns: u64, eye: Eye, png: &Png) -> Vec<u8> {
 }
 
 /// A `sensor_msgs/CameraInfo` with the model `equidistant`, which ROS shares with OpenCV's fisheye model and Kalibr: r = f (θ + d1 θ³ + d2 θ⁵ +
-/// d3 θ⁷ + d4 θ⁹). A moving pupil and asymmetry have no place there; the attached rig file has them.
+/// d3 θ⁷ + d4 θ⁹). A moving pupil, asymmetry and further radial terms have no place there; the attached rig file has them.
 pub fn camera_info(stamp_ns: u64, eye: Eye, lens: &KannalaBrandt) -> Vec<u8> {
-    let OpenCvFisheye { fx, fy, cx, cy, k } = lens.to_opencv();
+    let OpenCvFisheye { fx, fy, cx, cy, k } = lens.nearest_opencv();
     lens_info(header(stamp_ns, eye.name()), lens.size(), ("equidistant", &k), [fx, fy, cx, cy])
 }
 

@@ -31,10 +31,10 @@ use vergence_matching::TrackingMatcher;
 use vergence_pipeline::{ColouredPoint, Exposures, Observation};
 use vergence_protocol::{Mode, Request, SessionId, Trigger};
 use vergence_reproduce::LensedRig;
-use vergence_rig::{AxisPosition, BENCH_TOML, Rig, RigCalibration, RigPose, Shutter};
+use vergence_rig::{AxisPosition, BENCH_TOML, LensField, Rig, RigCalibration, RigPose, Shutter};
 use vergence_scene::{Lens, LensChoice, Scene, TrueLens};
 use vergence_sim::{LiveCamera, Random, Rendering, Room, RoomCamera, SimulatedRig};
-use vergence_vision::{Angle, Length, LensField, Pixel, Side, Transform};
+use vergence_vision::{Angle, Length, Pixel, Side, Transform};
 
 const WIDTH: u32 = 480;
 /// From the first to the last row 19.2 ms, as long as 1280 rows of the real camera take.

@@ -76,6 +76,12 @@ pub struct CameraTable {
     /// Thin prism along v, of the fourth power.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub prism_s3: f64,
+    /// Coefficient of θ¹¹ relative to that of θ, the k5 of a lens with six in the form of OpenCV.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub radial_k5: f64,
+    /// Coefficient of θ¹³ relative to that of θ.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub radial_k6: f64,
     /// The model of another program by which the camera is computed. The keys above are then those of the polynomial that comes nearest,
     /// which other programs get, and from which a calibration goes on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -128,6 +134,7 @@ impl CameraTable {
         let [pupil_e0_mm, pupil_e1_mm] = camera.pupil().mm();
         let Asymmetry { tangential: [tangential_p1, tangential_p2], prism } = camera.asymmetry();
         let [prism_s0, prism_s1, prism_s2, prism_s3] = prism;
+        let [radial_k5, radial_k6] = camera.further_terms();
         Self {
             size: [width, height],
             theta_max: Some(camera.measured_field()),
@@ -148,6 +155,8 @@ impl CameraTable {
             prism_s1,
             prism_s2,
             prism_s3,
+            radial_k5,
+            radial_k6,
             model: camera.foreign_model().map(ModelTable::of),
         }
     }
@@ -177,11 +186,12 @@ impl CameraTable {
         let size = ImageSize { width, height };
         let k = [self.opencv_k1, self.opencv_k2, self.opencv_k3, self.opencv_k4];
         let lens = OpenCvFisheye { fx: self.fx, fy: self.fy, cx: self.cx, cy: self.cy, k };
+        let further = [self.radial_k5, self.radial_k6];
         let theta_max = match self.theta_max {
             Some(stated) => stated,
-            None => lens.largest_theta(size)?,
+            None => lens.largest_theta_with(further, size)?,
         };
-        let lens = KannalaBrandt::from_opencv(lens, theta_max, size)?
+        let lens = KannalaBrandt::from_opencv_with(lens, further, theta_max, size)?
             .with_pupil(Pupil::from_mm([self.pupil_e0_mm, self.pupil_e1_mm]))?
             .with_asymmetry(Asymmetry {
                 tangential: [self.tangential_p1, self.tangential_p2],
@@ -225,13 +235,13 @@ pub struct CalibrationTable {
     pub covariance: SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
 }
 
-/// Reads a covariance of 8 to 16 rows.
+/// Reads a covariance of 8 to 18 rows.
 fn square<'de, D: Deserializer<'de>>(file: D) -> Result<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>, D::Error> {
     let rows = Vec::<Vec<f64>>::deserialize(file)?;
     let n = rows.len();
     if !(CENTRAL_PARAMETERS..=LENS_PARAMETERS).contains(&n) || rows.iter().any(|row| row.len() != n) {
         return Err(D::Error::custom(
-            "the covariance of a lens has 8 rows of 8 values, and as many more of each as it has parameters beyond opencv_k4: up to 16",
+            "the covariance of a lens has 8 rows of 8 values, and as many more of each as it has parameters beyond opencv_k4: up to 18",
         ));
     }
     if rows.iter().flatten().any(|value| !value.is_finite()) || (0..n).any(|i| rows[i][i] < 0.0) {

@@ -84,6 +84,12 @@ pub fn camera_in_words(camera: &KannalaBrandt) -> String {
         let [p1, p2, s0, s1, s2, s3] = camera.asymmetry().to_array();
         format!("\ntangential {p1:.6} {p2:.6}  prism {s0:.6} {s1:.6} {s2:.6} {s3:.6}")
     };
+    let further = if camera.has_further_terms() {
+        let [k5, k6] = camera.further_terms();
+        format!("\nradial_k5 {k5:.8}  radial_k6 {k6:.8}")
+    } else {
+        String::new()
+    };
     let model = camera.foreign_model().map_or_else(String::new, |model| {
         format!(
             "\ncomputed by the {} model; the numbers above are those of the polynomial that comes nearest",
@@ -92,7 +98,7 @@ pub fn camera_in_words(camera: &KannalaBrandt) -> String {
     });
     format!(
         "{} x {} px, valid to {:.2} from the axis\nfx {fx:.4}  fy {fy:.4}  cx {cx:.4}  cy {cy:.4}\n\
-         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}{pupil}{asymmetry}{model}",
+         opencv_k1 {k1:.6}  opencv_k2 {k2:.6}  opencv_k3 {k3:.6}  opencv_k4 {k4:.6}{pupil}{asymmetry}{further}{model}",
         size.width,
         size.height,
         camera.theta_max()
@@ -112,6 +118,7 @@ pub fn camera_json(camera: &KannalaBrandt) -> Value {
         "pupil_e1_mm": camera.pupil().e1.mm(),
         "tangential": camera.asymmetry().tangential,
         "prism": camera.asymmetry().prism,
+        "further_terms": camera.further_terms(),
         "model": camera.foreign_model().map(|model| {
             let values = model.parameters().into_iter().map(|parameter| (parameter.name, json!(parameter.value)));
             json!({"name": model.name(), "values": values.collect::<Map<_, _>>()})

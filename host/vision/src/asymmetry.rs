@@ -133,10 +133,11 @@ impl KannalaBrandt {
         self.asymmetry().is_zero()
     }
 
-    /// Whether [`crate::OpenCvFisheye`] holds all that this lens does: it is central and symmetric, and computed by no other model.
+    /// Whether [`crate::OpenCvFisheye`] holds all that this lens does: it is central and symmetric, has no further radial
+    /// terms, and is computed by no other model.
     #[must_use]
     pub fn fits_opencv(&self) -> bool {
-        self.is_central() && self.is_symmetric() && self.foreign_model().is_none()
+        self.is_central() && self.is_symmetric() && !self.has_further_terms() && self.foreign_model().is_none()
     }
 
     /// Where light arrives that the symmetric lens would image at `pixel`.

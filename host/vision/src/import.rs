@@ -1,6 +1,6 @@
 //! Conversion of lenses from and to the parameters of OpenCV and Kalibr.
 
-use crate::kannala_brandt::first_turn;
+use crate::radial_series::RadialSeries;
 use crate::{Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, Pixel};
 
 /// Lens parameters of OpenCV's `cv::fisheye` and of Kalibr's `equidistant` distortion, which share one form:
@@ -32,14 +32,10 @@ impl KannalaBrandt {
     /// # Errors
     /// The errors of [`KannalaBrandt::new`].
     pub fn from_opencv(camera: OpenCvFisheye, theta_max: Angle, size: ImageSize) -> Result<Self, InvalidLens> {
-        // Checked here, because the quotient fy / fx hides two negative signs.
-        if camera.fx <= 0.0 || camera.fy <= 0.0 {
-            return Err(InvalidLens::FocalLength);
-        }
-        Self::new(camera.coefficients(), camera.fy / camera.fx, camera.principal_point(), theta_max, size)
+        Self::from_opencv_with(camera, [0.0; 2], theta_max, size)
     }
 
-    /// Returns this lens in OpenCV's parameters, which omit `theta_max` and the image size.
+    /// Returns this lens in OpenCV's parameters, which omit `theta_max`, the image size, and all that a lens has besides.
     #[must_use]
     pub fn to_opencv(&self) -> OpenCvFisheye {
         let [fx, rest @ ..] = self.k();
@@ -49,43 +45,47 @@ impl KannalaBrandt {
 }
 
 impl OpenCvFisheye {
-    /// The largest usable half field of these parameters, see [`largest_theta()`].
+    /// The largest usable half field of a lens whose file states none.
+    ///
+    /// It is the angle seen at the farthest corner of the image, or 99 % of the angle where r(θ) stops growing, whichever
+    /// is smaller. This is the limit of the polynomial: a lens whose image circle lies inside the sensor, or a calibration
+    /// without points near the border, is usable for less.
     ///
     /// # Errors
-    /// The errors of [`largest_theta()`].
+    /// [`InvalidLens`] where the parameters describe no lens at any field.
     pub fn largest_theta(&self, size: ImageSize) -> Result<Angle, InvalidLens> {
+        self.largest_theta_with([0.0; 2], size)
+    }
+
+    /// The same with the coefficients of [`KannalaBrandt::further_terms`].
+    ///
+    /// # Errors
+    /// Those of [`Self::largest_theta`].
+    pub fn largest_theta_with(&self, further: [f64; 2], size: ImageSize) -> Result<Angle, InvalidLens> {
         if self.fx <= 0.0 || self.fy <= 0.0 {
             return Err(InvalidLens::FocalLength);
         }
-        largest_theta(self.coefficients(), self.fy / self.fx, self.principal_point(), size)
+        self.series(further).largest_theta(self.fy / self.fx, Pixel { u: self.cx, v: self.cy }, size)
     }
 
-    fn coefficients(&self) -> [f64; 5] {
+    pub(crate) fn series(&self, further: [f64; 2]) -> RadialSeries {
         let [k1, k2, k3, k4] = self.k;
-        [1.0, k1, k2, k3, k4].map(|k| self.fx * k)
-    }
-
-    const fn principal_point(&self) -> Pixel {
-        Pixel { u: self.cx, v: self.cy }
+        RadialSeries { k: [1.0, k1, k2, k3, k4].map(|k| self.fx * k), further }
     }
 }
 
-/// The largest usable half field of a lens whose file states none.
-///
-/// It is the angle seen at the farthest corner of the image, or 99 % of the angle where r(θ) stops growing, whichever
-/// is smaller. This is the limit of the polynomial: a lens whose image circle lies inside the sensor, or a calibration
-/// without points near the border, is usable for less. The arguments are those of [`KannalaBrandt::new`].
-///
-/// # Errors
-/// [`InvalidLens`] where the parameters describe no lens at any field.
-pub fn largest_theta(k: [f64; 5], aspect: f64, centre: Pixel, size: ImageSize) -> Result<Angle, InvalidLens> {
-    // Near dr/dθ = 0 the uncertainty of a pixel's ray grows without bound.
-    const BELOW_TURN: f64 = 0.99;
-    const WIDEST: Angle = Angle::from_deg(179.0);
-    let limit = first_turn(&k, WIDEST.rad()).map_or(WIDEST, |turn| Angle::from_rad(BELOW_TURN * turn));
-    let widest = KannalaBrandt::new(k, aspect, centre, limit, size)?;
-    let seen = corners(size).map(|corner| widest.unproject::<Camera>(corner).map_or(limit, |ray| ray.angle_to_axis()));
-    Ok(seen.into_iter().fold(Angle::default(), |a, b| if b > a { b } else { a }))
+impl RadialSeries {
+    /// See [`OpenCvFisheye::largest_theta`].
+    pub fn largest_theta(self, aspect: f64, centre: Pixel, size: ImageSize) -> Result<Angle, InvalidLens> {
+        // Near dr/dθ = 0 the uncertainty of a pixel's ray grows without bound.
+        const BELOW_TURN: f64 = 0.99;
+        const WIDEST: Angle = Angle::from_deg(179.0);
+        let limit = self.first_turn(WIDEST.rad()).map_or(WIDEST, |turn| Angle::from_rad(BELOW_TURN * turn));
+        let widest = KannalaBrandt::of_series(self, aspect, centre, limit, size)?;
+        let seen =
+            corners(size).map(|corner| widest.unproject::<Camera>(corner).map_or(limit, |ray| ray.angle_to_axis()));
+        Ok(seen.into_iter().fold(Angle::default(), |a, b| if b > a { b } else { a }))
+    }
 }
 
 /// The outer corners of the four corner pixels.

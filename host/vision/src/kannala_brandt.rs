@@ -7,15 +7,17 @@
 //! r(θ) = k1 θ + k2 θ³ + k3 θ⁵ + k4 θ⁷ + k5 θ⁹        u = cx + r cos φ        v = cy + aspect · r sin φ
 //! ```
 //!
-//! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels. To this come a pupil that
-//! moves ([`crate::Pupil`]) and elements off the axis ([`crate::Asymmetry`]), where a lens has them. A lens of another program's file is
+//! θ is the angle to the optical axis, from 0 to beyond 90°; φ runs from x (right) to y (down). `k` is in pixels. To this come terms of θ¹¹
+//! and θ¹³ ([`KannalaBrandt::with_further_terms`]), a pupil that moves ([`crate::Pupil`]) and elements off the axis ([`crate::Asymmetry`]),
+//! where a lens has them. A lens of another program's file is
 //! computed by that program's own model ([`ForeignModel`]).
 
 use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use crate::{Angle, Asymmetry, ForeignModel, Frame, InvalidLens, Point, Pupil, UnitRay, largest_theta};
+use crate::radial_series::RadialSeries;
+use crate::{Angle, Asymmetry, ForeignModel, Frame, InvalidLens, Point, Pupil, UnitRay};
 
 /// An image position in pixels. (0, 0) is the centre of the top-left pixel, u to the right, v down.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,7 +77,7 @@ impl FromStr for ImageSize {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
-    k: [f64; 5],
+    series: RadialSeries,
     aspect: f64,
     centre: Pixel,
     theta_max: f64,
@@ -106,25 +108,35 @@ impl KannalaBrandt {
         theta_max: Angle,
         size: ImageSize,
     ) -> Result<Self, InvalidLens> {
+        Self::of_series(RadialSeries { k, further: [0.0; 2] }, aspect, centre, theta_max, size)
+    }
+
+    pub(crate) fn of_series(
+        series: RadialSeries,
+        aspect: f64,
+        centre: Pixel,
+        theta_max: Angle,
+        size: ImageSize,
+    ) -> Result<Self, InvalidLens> {
         let stated = theta_max.rad();
-        if !k.iter().chain(&[aspect, centre.u, centre.v, stated]).all(|x| x.is_finite()) {
+        if !series.terms().iter().chain(&[aspect, centre.u, centre.v, stated]).all(|x| x.is_finite()) {
             return Err(InvalidLens::NotFinite);
         }
-        if k[0] <= 0.0 || aspect <= 0.0 {
+        if series.k[0] <= 0.0 || aspect <= 0.0 {
             return Err(InvalidLens::FocalLength);
         }
         if stated <= 0.0 || stated >= std::f64::consts::PI {
             return Err(InvalidLens::ThetaMax(theta_max));
         }
-        if let Some(turn) = first_turn(&k, stated) {
+        if let Some(turn) = series.first_turn(stated) {
             return Err(InvalidLens::TurnsOver { turn: Angle::from_rad(turn), stated: theta_max });
         }
         Ok(Self {
-            k,
+            series,
             aspect,
             centre,
             theta_max: stated,
-            r_max: radius(&k, stated),
+            r_max: series.radius(stated),
             measured: stated,
             size,
             pupil: Pupil::default(),
@@ -145,20 +157,34 @@ impl KannalaBrandt {
         let scaled = |coordinate: f64| (coordinate + 0.5) * scale - 0.5;
         let centre = Pixel { u: scaled(self.centre.u), v: scaled(self.centre.v) };
         let size = ImageSize { width, height };
-        let lens = Self::new(self.k.map(|k| k * scale), self.aspect, centre, Angle::from_rad(self.theta_max), size)?;
+        let series = RadialSeries { k: self.series.k.map(|k| k * scale), ..self.series };
+        let lens = Self::of_series(series, self.aspect, centre, self.theta_max(), size)?;
         let foreign = self.foreign.map(|model| model.scaled(scale));
         Ok(Self { measured: self.measured, pupil: self.pupil, asymmetry: self.asymmetry, foreign, ..lens })
     }
 
-    /// The same lens beyond the field in which it was measured: as far as [`largest_theta()`] says that its polynomial is of use.
+    /// This lens with the coefficients k5 and k6 of [`Self::from_opencv_with`] in the place of its own.
+    ///
+    /// # Errors
+    /// The errors of [`KannalaBrandt::new`] and of [`KannalaBrandt::with_asymmetry`].
+    pub fn with_further_terms(self, further: [f64; 2]) -> Result<Self, InvalidLens> {
+        let series = RadialSeries { further, ..self.series };
+        let lens = Self::of_series(series, self.aspect, self.centre, self.theta_max(), self.size)?;
+        let lens = lens.with_asymmetry(self.asymmetry)?;
+        Ok(Self { measured: self.measured, pupil: self.pupil, foreign: self.foreign, ..lens })
+    }
+
+    /// The same lens beyond the field in which it was measured: as far as [`crate::OpenCvFisheye::largest_theta`] says that its polynomial is of use.
     /// [`Self::is_measured`] still tells the field in which it was measured. A lens of another program's model stays as it is.
     #[must_use]
     pub fn extrapolated(&self) -> Self {
         if self.foreign.is_some() {
             return *self;
         }
-        let wider = largest_theta(self.k, self.aspect, self.centre, self.size)
-            .and_then(|limit| Self::new(self.k, self.aspect, self.centre, limit, self.size))
+        let wider = self
+            .series
+            .largest_theta(self.aspect, self.centre, self.size)
+            .and_then(|limit| Self::of_series(self.series, self.aspect, self.centre, limit, self.size))
             .and_then(|wider| wider.with_asymmetry(self.asymmetry));
         match wider {
             Ok(wider) if wider.theta_max > self.theta_max => {
@@ -195,7 +221,7 @@ impl KannalaBrandt {
             return model.project(ray);
         }
         // At the axis r/rho tends to k1.
-        let scale = if rho > 0.0 { radius(&self.k, theta) / rho } else { self.k[0] };
+        let scale = if rho > 0.0 { self.series.radius(theta) / rho } else { self.series.k[0] };
         let symmetric = Pixel { u: self.centre.u + scale * d.x, v: self.centre.v + self.aspect * scale * d.y };
         Ok(self.with_displacement(symmetric))
     }
@@ -224,22 +250,22 @@ impl KannalaBrandt {
             return Err(OutsideField);
         }
         let theta = self.angle_at_radius(r);
-        let scale = if r > 0.0 { theta.sin() / r } else { 1.0 / self.k[0] };
+        let scale = if r > 0.0 { theta.sin() / r } else { 1.0 / self.series.k[0] };
         UnitRay::new(Vector3::new(x * scale, y * scale, theta.cos())).ok_or(OutsideField)
     }
 
     /// Solves r(θ) = `r` for θ, by Newton's method kept inside a shrinking bracket.
     pub(crate) fn angle_at_radius(&self, r: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.theta_max);
-        let mut theta = (r / self.k[0]).clamp(low, high);
+        let mut theta = (r / self.series.k[0]).clamp(low, high);
         for _ in 0..60 {
-            let error = radius(&self.k, theta) - r;
+            let error = self.series.radius(theta) - r;
             if error > 0.0 {
-                high = theta;
+                high = theta
             } else {
-                low = theta;
+                low = theta
             }
-            let newton = theta - error / slope(&self.k, theta);
+            let newton = theta - error / self.series.slope(theta);
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
             let step = (next - theta).abs();
             theta = next;
@@ -286,10 +312,14 @@ impl KannalaBrandt {
         self.asymmetry
     }
 
-    /// The five coefficients k1 to k5 in pixels.
+    /// The five coefficients k1 to k5 in pixels, without [`Self::further_terms`].
     #[must_use]
     pub const fn k(&self) -> [f64; 5] {
-        self.k
+        self.series.k
+    }
+
+    pub(crate) const fn series(&self) -> &RadialSeries {
+        &self.series
     }
 
     /// The aspect ratio fy / fx.
@@ -310,9 +340,10 @@ impl KannalaBrandt {
         Angle::from_rad(self.theta_max)
     }
 
-    /// The image radius r(θ) in pixels, for θ in radians.
-    pub(crate) fn radius_at(&self, theta: f64) -> f64 {
-        radius(&self.k, theta)
+    /// The image radius in pixels along u at the angle `theta` to the axis, of the lens as if it were symmetric.
+    #[must_use]
+    pub fn radius(&self, theta: Angle) -> f64 {
+        self.series.radius(theta.rad())
     }
 
     /// The image radius r(theta_max) in pixels.
@@ -329,35 +360,6 @@ impl KannalaBrandt {
     /// The radial resolution dr/dθ in pixels per radian, at the angle `theta` from the optical axis.
     #[must_use]
     pub fn pixels_per_radian(&self, theta: Angle) -> f64 {
-        slope(&self.k, theta.rad())
+        self.series.slope(theta.rad())
     }
-}
-
-/// The image radius r(θ) in pixels.
-fn radius(k: &[f64; 5], theta: f64) -> f64 {
-    let s = theta * theta;
-    theta * (k[0] + s * (k[1] + s * (k[2] + s * (k[3] + s * k[4]))))
-}
-
-/// The slope dr/dθ in pixels per radian.
-fn slope(k: &[f64; 5], theta: f64) -> f64 {
-    let s = theta * theta;
-    k[0] + s * (3.0 * k[1] + s * (5.0 * k[2] + s * (7.0 * k[3] + s * 9.0 * k[4])))
-}
-
-/// The first θ up to `limit` where dr/dθ ≤ 0, found by a scan in thousandths of `limit` and bisection.
-pub(crate) fn first_turn(k: &[f64; 5], limit: f64) -> Option<f64> {
-    const STEPS: u32 = 1000;
-    let at = |i: u32| limit * f64::from(i) / f64::from(STEPS);
-    let beyond = (0..=STEPS).find(|&i| slope(k, at(i)) <= 0.0)?;
-    let (mut growing, mut turned) = (at(beyond.saturating_sub(1)), at(beyond));
-    while turned - growing > 4.0 * f64::EPSILON {
-        let middle = 0.5 * (growing + turned);
-        if slope(k, middle) > 0.0 {
-            growing = middle;
-        } else {
-            turned = middle;
-        }
-    }
-    Some(turned)
 }

@@ -9,8 +9,8 @@ use crate::{Angle, Asymmetry, Frame, KannalaBrandt, Pupil, UnitRay};
 
 /// Number of lens parameters. Their order is that of [`LENS_PARAMETER_NAMES`]: fx, fy, cx, cy in pixels, then k1 to k4 as defined by OpenCV
 /// fisheye, then the pupil's coefficients e0 and e1 in millimetres ([`Pupil`]), which move the origin of a ray and not its direction, then
-/// p1, p2 and s0 to s3 of [`Asymmetry`].
-pub const LENS_PARAMETERS: usize = 16;
+/// p1, p2 and s0 to s3 of [`Asymmetry`], then k5 and k6 of [`KannalaBrandt::further_terms`].
+pub const LENS_PARAMETERS: usize = 18;
 /// Names of the lens parameters in files, in their order.
 pub const LENS_PARAMETER_NAMES: [&str; LENS_PARAMETERS] = [
     "fx",
@@ -29,6 +29,8 @@ pub const LENS_PARAMETER_NAMES: [&str; LENS_PARAMETERS] = [
     "prism_s1",
     "prism_s2",
     "prism_s3",
+    "radial_k5",
+    "radial_k6",
 ];
 /// Number of the parameters before e0: those of a central, symmetric lens.
 pub const CENTRAL_PARAMETERS: usize = 8;
@@ -36,6 +38,8 @@ pub const CENTRAL_PARAMETERS: usize = 8;
 pub(crate) const PUPIL: [usize; 2] = [8, 9];
 /// Index of p1.
 const FIRST_OF_ASYMMETRY: usize = 10;
+/// Index of k5.
+const FURTHER: usize = 16;
 
 /// A lens's local geometry at a ray: the angle θ, the radial and tangential directions in space and in the image, and
 /// the resolution along each.
@@ -121,8 +125,8 @@ impl KannalaBrandt {
         let theta = sine.atan2(d.z);
         // On the axis every radial direction is equivalent.
         let (cos_phi, sin_phi) = if sine > 0.0 { (d.x / sine, d.y / sine) } else { (1.0, 0.0) };
-        let across = if sine > 0.0 { self.radius_at(theta) / sine } else { self.k()[0] };
-        let place = || Vector2::new(cos_phi, sin_phi) * (self.radius_at(theta) / self.k()[0]);
+        let across = if sine > 0.0 { self.series().radius(theta) / sine } else { self.k()[0] };
+        let place = || Vector2::new(cos_phi, sin_phi) * (self.series().radius(theta) / self.k()[0]);
         Local {
             theta,
             space: [Vector3::new(d.z * cos_phi, d.z * sin_phi, -sine), Vector3::new(-sin_phi, cos_phi, 0.0)],
@@ -147,7 +151,7 @@ impl Local {
     fn pixel_by_lens(&self, lens: &KannalaBrandt) -> SMatrix<f64, 2, LENS_PARAMETERS> {
         let [fx, fy] = [lens.k()[0], lens.k()[0] * lens.aspect()];
         let [radial, _] = self.image;
-        pixel_by_lens([fx, fy], self.theta, lens.radius_at(self.theta) / fx, radial.into(), &lens.asymmetry())
+        pixel_by_lens([fx, fy], self.theta, lens.series().radius(self.theta) / fx, radial.into(), &lens.asymmetry())
     }
 }
 
@@ -177,7 +181,7 @@ pub(crate) fn pixel_by_lens(
     columns[(0, 2)] = 1.0;
     columns[(1, 3)] = 1.0;
     let (mut power, squared) = (theta, theta * theta);
-    for column in 4..CENTRAL_PARAMETERS {
+    for column in (4..CENTRAL_PARAMETERS).chain(FURTHER..LENS_PARAMETERS) {
         power *= squared;
         columns[(0, column)] = fx * power * outward.x;
         columns[(1, column)] = fy * power * outward.y;

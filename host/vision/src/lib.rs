@@ -35,11 +35,11 @@ mod import;
 mod invalid_lens;
 mod kannala_brandt;
 mod lens_derivatives;
-mod lens_field;
 mod lens_step;
 mod match_sigma;
 mod median;
 mod pupil;
+mod radial_series;
 mod shared_covariance;
 mod stand_in;
 mod stereo_pair;
@@ -58,17 +58,15 @@ pub use covariance::{covariance, range_sigma};
 pub use epipolar::{dihedral, ray_to_plane};
 pub use foreign::{
     CameraModel, Central, DoubleSphere, Eucm, Fisheye624, Formula, LensFit, LensSteps, Mei, ModelParameter, NoFit,
-    OCam, ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineFit, SplineGrid, SplinedStereographic, fit_lens,
-    fit_spline, model_of,
+    OCam, ParameterUnit, Pinhole, Radtan, Sight, SightRegion, SplineGrid, SplinedStereographic, fit_lens, model_of,
 };
 pub use foreign_model::ForeignModel;
 pub use frames::{Base, Camera, Frame, Left, Point, Right, Side, Transform, UnitRay, Virtual, World};
 pub use gates::{DropReason, Gates};
-pub use import::{OpenCvFisheye, largest_theta};
+pub use import::OpenCvFisheye;
 pub use invalid_lens::InvalidLens;
 pub use kannala_brandt::{ImageSize, InvalidImageSize, KannalaBrandt, OutsideField, Pixel};
 pub use lens_derivatives::{CENTRAL_PARAMETERS, LENS_PARAMETER_NAMES, LENS_PARAMETERS};
-pub use lens_field::{LensField, UnknownField};
 pub use match_sigma::MatchSigma;
 pub use median::median;
 pub use pupil::{Pupil, SeenPoint, pupil_shift, pupil_shift_by_sine, pupil_shift_slope};

@@ -9,13 +9,15 @@ use crate::lens_derivatives::LENS_PARAMETERS;
 pub const SHARED_PARAMETERS: usize = 2 * LENS_PARAMETERS + 6;
 /// The first parameter of the pose.
 const POSE: usize = 2 * LENS_PARAMETERS;
+/// Parameters that are not exact of a pair whose lenses have five terms of the radius and one of the pupil each, or fewer.
+const FEW: usize = 24;
 
 /// The covariance of all shared parameters.
 type Covariance = SMatrix<f64, SHARED_PARAMETERS, SHARED_PARAMETERS>;
 /// A number for each shared parameter.
 type OfEach<T> = [T; SHARED_PARAMETERS];
 
-/// The covariance (38 × 38) of the parameters that all points of a pair share.
+/// The covariance (42 × 42) of the parameters that all points of a pair share.
 ///
 /// Their order is: left lens, right lens (each in the order of [`LENS_PARAMETERS`]), then the relative pose as a turn ω about the left axes
 /// in radians and a shift δ of the right camera in the left frame in millimetres: R ← exp(ω) R, t ← t + δ. Rows and columns of parameters
@@ -23,7 +25,7 @@ type OfEach<T> = [T; SHARED_PARAMETERS];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SharedCovariance {
     matrix: Covariance,
-    /// The matrix row by row.
+    /// Its rows and columns of the parameters that are not exact, row by row.
     rows: OfEach<OfEach<f64>>,
     /// The parameters that are not exact, and how many they are.
     unknown: (OfEach<usize>, usize),
@@ -44,7 +46,11 @@ impl SharedCovariance {
             unknown[count] = parameter;
             count += 1;
         }
-        Self { matrix: covariance, rows: covariance.transpose().into(), unknown: (unknown, count) }
+        let mut rows = [[0.0; SHARED_PARAMETERS]; SHARED_PARAMETERS];
+        for (row, place) in (0..count).flat_map(|row| (0..count).map(move |place| (row, place))) {
+            rows[row][place] = covariance[(unknown[row], unknown[place])];
+        }
+        Self { matrix: covariance, rows, unknown: (unknown, count) }
     }
 
     /// Replaces the covariance of the pose (6 × 6) and removes its correlation with the lenses.
@@ -72,7 +78,7 @@ impl SharedCovariance {
         self.matrix.fixed_view::<6, 6>(POSE, POSE).into_owned()
     }
 
-    /// Replaces the covariances of both lenses (16 × 16) and removes their correlation with each other and with the pose.
+    /// Replaces the covariances of both lenses (18 × 18) and removes their correlation with each other and with the pose.
     #[must_use]
     pub fn with_lenses(self, lenses: [&SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>; 2]) -> Self {
         let mut matrix = self.matrix;
@@ -90,15 +96,14 @@ impl SharedCovariance {
         by_shared: &SMatrix<f64, N, SHARED_PARAMETERS>,
         other: &SMatrix<f64, N, SHARED_PARAMETERS>,
     ) -> SMatrix<f64, N, N> {
-        let (unknown, count) = &self.unknown;
-        let unknown = &unknown[..*count];
-        let mut with_shared = SMatrix::<f64, SHARED_PARAMETERS, N>::zeros();
-        for (row, mut with_shared) in by_shared.row_iter().zip(with_shared.column_iter_mut()) {
-            with_shared.copy_from_slice(&combined(&std::array::from_fn(|i| row[i]), unknown, &self.rows));
+        let unknown = &self.unknown.0[..self.unknown.1];
+        let mut with_unknown = SMatrix::<f64, SHARED_PARAMETERS, N>::zeros();
+        for (row, mut with_unknown) in by_shared.row_iter().zip(with_unknown.column_iter_mut()) {
+            with_unknown.copy_from_slice(&combined(&std::array::from_fn(|i| row[i]), unknown, &self.rows));
         }
         let mut sum = SMatrix::zeros();
-        for &column in unknown {
-            sum += with_shared.row(column).transpose() * other.column(column).transpose();
+        for (place, &column) in unknown.iter().enumerate() {
+            sum += with_unknown.row(place).transpose() * other.column(column).transpose();
         }
         sum
     }
@@ -110,14 +115,24 @@ impl SharedCovariance {
     }
 }
 
-/// The sum of `rows` by their `factors`, each number in the order of the `chosen` ones.
+/// The sum of the `rows` of the `unknown` parameters by their `factors`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-fn combined(factors: &OfEach<f64>, chosen: &[usize], rows: &OfEach<OfEach<f64>>) -> OfEach<f64> {
+fn combined(factors: &OfEach<f64>, unknown: &[usize], rows: &OfEach<OfEach<f64>>) -> OfEach<f64> {
     let mut sums = [0.0; SHARED_PARAMETERS];
-    for &row in chosen {
-        for (sum, number) in sums.iter_mut().zip(&rows[row]) {
-            *sum += factors[row] * number;
-        }
+    let factors = unknown.iter().map(|&parameter| factors[parameter]).zip(rows);
+    match unknown.len() {
+        ..=FEW => add::<FEW>(factors, &mut sums),
+        _ => add::<SHARED_PARAMETERS>(factors, &mut sums),
     }
     sums
+}
+
+/// Adds the first so many numbers of rows by their factors.
+#[inline(always)]
+fn add<'a, const MOST: usize>(rows: impl Iterator<Item = (f64, &'a OfEach<f64>)>, sums: &mut OfEach<f64>) {
+    for (factor, row) in rows {
+        for (sum, number) in sums[..MOST].iter_mut().zip(&row[..MOST]) {
+            *sum += factor * number;
+        }
+    }
 }

@@ -22,12 +22,24 @@ impl KannalaBrandt {
         }
         let seen = self.images_at(distance);
         let outermost = Angle::from_rad(seen.iter().map(|(ray, _)| ray.angle_to_axis().rad()).fold(0.0, f64::max));
-        let mut found = Self::from_opencv(self.to_opencv(), outermost, self.size())?;
+        // Without its further terms the radius may turn over.
+        let k = if self.has_further_terms() { [0.0; 4] } else { self.to_opencv().k };
+        let start = OpenCvFisheye { k, ..self.to_opencv() };
+        let mut found = Self::from_opencv(start, outermost, self.size())?;
         for _ in 0..STEPS {
             let stepped = found.towards(&seen).ok_or(InvalidLens::NotFinite)?;
             found = Self::from_opencv(stepped, outermost, self.size())?;
         }
         Ok(found)
+    }
+
+    /// OpenCV's parameters of the lens that comes nearest in directions to this one without its pupil and its asymmetry: those of
+    /// [`Self::to_opencv`], unless the radius has further terms.
+    #[must_use]
+    pub fn nearest_opencv(&self) -> OpenCvFisheye {
+        let bare = Self::of_series(*self.series(), self.aspect(), self.centre(), self.theta_max(), self.size());
+        let nearest = bare.and_then(|lens| lens.central_at(Length::from_mm(1.0)));
+        nearest.map_or_else(|_| self.to_opencv(), |lens| lens.to_opencv())
     }
 
     /// The largest distance in pixels between the images of points at `distance` by this lens and by `central`, over the field of both.

@@ -19,16 +19,16 @@ fn central() -> KannalaBrandt {
 
 /// With an aspect ratio too, so that no factor of it is lost.
 fn of(parameters: [f64; LENS_PARAMETERS]) -> KannalaBrandt {
-    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, asymmetry @ ..] = parameters;
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, further @ ..] = parameters;
     let opencv = OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] };
-    let central = KannalaBrandt::from_opencv(opencv, Angle::from_deg(105.0), SIZE).unwrap();
+    let central = KannalaBrandt::from_opencv_with(opencv, further, Angle::from_deg(105.0), SIZE).unwrap();
     let moving = central.with_pupil(Pupil::from_mm([e0, e1])).unwrap();
-    moving.with_asymmetry(Asymmetry::from_array(asymmetry)).unwrap()
+    moving.with_asymmetry(Asymmetry::from_array([p1, p2, s0, s1, s2, s3])).unwrap()
 }
 
 const PARAMETERS: [f64; LENS_PARAMETERS] = [
     599.1, 606.0, 1020.0, 1031.0, -0.052, 0.0041, -0.0019, 0.0002, 2.77, 0.056, 0.0012, -0.0007, 0.0009, -0.0002,
-    -0.0011, 0.0003,
+    -0.0011, 0.0003, -4e-5, 3e-6,
 ];
 
 fn ray(theta: f64, phi: f64) -> UnitRay<Camera> {
@@ -153,7 +153,7 @@ fn a_symmetric_lens_stands_in() {
     assert!(stand_in.fits_opencv());
     let dropped = of({
         let mut parameters = PARAMETERS;
-        parameters[10..].fill(0.0);
+        parameters[10..16].fill(0.0);
         parameters
     });
     let dropped = dropped.central_at(Length::from_mm(500.0)).unwrap();

@@ -3,9 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
 use nalgebra::Vector3;
-use vergence_vision::{
-    Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay, largest_theta,
-};
+use vergence_vision::{Angle, Camera, ImageSize, InvalidLens, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
 
 const SIZE: ImageSize = ImageSize { width: 1920, height: 1536 };
 
@@ -77,10 +75,10 @@ fn opencv_parameters_of_no_lens_are_refused() {
 /// r = 600 θ: the farthest of the corners (±960, ±768) px from the centre is at hypot(960, 768) / 600 rad.
 #[test]
 fn largest_theta_is_the_farthest_corner_of_a_growing_lens() {
-    let [k, centre] = [[600.0, 0.0, 0.0, 0.0, 0.0], [959.5, 767.5, 0.0, 0.0, 0.0]];
-    let theta = largest_theta(k, 1.0, Pixel { u: centre[0], v: centre[1] }, SIZE).unwrap();
+    let lens = OpenCvFisheye { fx: 600.0, fy: 600.0, cx: 959.5, cy: 767.5, k: [0.0; 4] };
+    let theta = lens.largest_theta(SIZE).unwrap();
     assert!((theta.rad() - 960f64.hypot(768.0) / 600.0).abs() < 1e-12, "{theta}");
-    let shifted = largest_theta(k, 1.0, Pixel { u: 1000.5, v: 767.5 }, SIZE).unwrap();
+    let shifted = OpenCvFisheye { cx: 1000.5, ..lens }.largest_theta(SIZE).unwrap();
     assert!((shifted.rad() - 1001f64.hypot(768.0) / 600.0).abs() < 1e-12, "{shifted}");
 }
 
@@ -90,7 +88,8 @@ fn largest_theta_keeps_below_the_turn() {
     let k = [600.0, -60.0, 0.0, 0.0, 0.0];
     let centre = Pixel { u: 959.5, v: 767.5 };
     let turn = (10.0f64 / 3.0).sqrt();
-    let theta = largest_theta(k, 1.0, centre, SIZE).unwrap();
+    let lens = OpenCvFisheye { fx: 600.0, fy: 600.0, cx: centre.u, cy: centre.v, k: [-0.1, 0.0, 0.0, 0.0] };
+    let theta = lens.largest_theta(SIZE).unwrap();
     assert!((theta.rad() - 0.99 * turn).abs() < 1e-12, "{theta}");
     assert!(KannalaBrandt::new(k, 1.0, centre, theta, SIZE).is_ok());
     match KannalaBrandt::new(k, 1.0, centre, Angle::from_deg(120.0), SIZE) {

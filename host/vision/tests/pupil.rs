@@ -22,7 +22,8 @@ fn lens(e0: f64) -> KannalaBrandt {
 /// A lens with all other parameters that a lens can have.
 fn displaced(lens: KannalaBrandt) -> KannalaBrandt {
     let growing = lens.with_pupil(Pupil { e1: Length::from_mm(0.2), ..lens.pupil() }).unwrap();
-    growing.with_asymmetry(Asymmetry::from_array([0.0012, -0.0007, 0.0009, -0.0002, -0.0011, 0.0003])).unwrap()
+    let longer = growing.with_further_terms([-4e-5, 3e-6]).unwrap();
+    longer.with_asymmetry(Asymmetry::from_array([0.0012, -0.0007, 0.0009, -0.0002, -0.0011, 0.0003])).unwrap()
 }
 
 fn direction(theta: f64, phi: f64) -> Vector3<f64> {
@@ -128,7 +129,9 @@ impl Pair {
                 cy: cy + by[3],
                 k: std::array::from_fn(|i| k[i] + by[4 + i]),
             };
-            let central = KannalaBrandt::from_opencv(opencv, lens.theta_max(), SIZE).unwrap();
+            let [k5, k6] = lens.further_terms();
+            let further = [k5 + by[16], k6 + by[17]];
+            let central = KannalaBrandt::from_opencv_with(opencv, further, lens.theta_max(), SIZE).unwrap();
             let [e0, e1] = lens.pupil().mm();
             let moving = central.with_pupil(Pupil::from_mm([e0 + by[8], e1 + by[9]])).unwrap();
             let asymmetry = lens.asymmetry().to_array();

@@ -11,6 +11,8 @@ use vergence_vision::{
 pub(crate) const LENS: usize = LENS_PARAMETERS;
 /// The parameters of a central and symmetric lens: those before e0.
 pub(crate) const CENTRAL: usize = CENTRAL_PARAMETERS;
+/// Index of k5, the first of the further radial terms: the last two parameters.
+pub(crate) const K5: usize = LENS - 2;
 /// Index of the pupil's e0, and of e1.
 pub(crate) const E0: usize = CENTRAL;
 pub(crate) const E1: usize = CENTRAL + 1;
@@ -27,6 +29,8 @@ pub struct LensParameters {
     pub pupil: Pupil,
     /// Decentring and thin prism.
     pub asymmetry: Asymmetry,
+    /// k5 and k6, of θ¹⁰ and θ¹² as k1 to k4 are of θ² to θ⁸.
+    pub further: [f64; 2],
     /// A lens that is computed by another program's model, whose images count in place of those by the parameters above.
     pub foreign: Option<KannalaBrandt>,
 }
@@ -56,7 +60,7 @@ pub fn reproject(lens: impl Into<LensParameters>, point: &Point<Camera>) -> Opti
 /// [`reproject`], inside of the caller, so that what it does not use is not computed.
 #[inline(always)]
 pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Option<Reprojection> {
-    let LensParameters { central: lens, pupil, asymmetry, foreign } = lens;
+    let LensParameters { central: lens, pupil, asymmetry, further: [k5, k6], foreign } = lens;
     let [x, y, z]: [f64; 3] = point.mm().into();
     let across = x * x + y * y;
     let (rho, square) = (across.sqrt(), across + z * z);
@@ -67,7 +71,8 @@ pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Optio
     let theta = seen.map_or_else(|| rho.atan2(z), |seen| seen.theta);
     let [k1, k2, k3, k4] = lens.k;
     let t = theta * theta;
-    let slope = 1.0 + t * (3.0 * k1 + t * (5.0 * k2 + t * (7.0 * k3 + t * 9.0 * k4)));
+    let [tail, tail_slope] = [t * (k5 + t * k6), t * (11.0 * k5 + t * 13.0 * k6)];
+    let slope = 1.0 + t * (3.0 * k1 + t * (5.0 * k2 + t * (7.0 * k3 + t * (9.0 * k4 + tail_slope))));
 
     // ∂θ/∂ρ and -∂θ/∂z / ρ.
     let (outward, along) = match &seen {
@@ -83,7 +88,7 @@ pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Optio
         let cubic = k1 - 1.0 / 3.0;
         ((1.0 + cubic * t) / z, 2.0 * cubic / (z * z * z), 1.0 / z)
     } else {
-        let scale = theta * (1.0 + t * (k1 + t * (k2 + t * (k3 + t * k4)))) / rho;
+        let scale = theta * (1.0 + t * (k1 + t * (k2 + t * (k3 + t * (k4 + tail))))) / rho;
         (scale, (outward - scale) / across, theta / rho)
     };
     let (fx, fy) = (lens.fx, lens.fy);
@@ -119,6 +124,8 @@ pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Optio
             s1,
             s2,
             s3,
+            power(5),
+            power(6),
         ],
         by_point: [
             [fx * (scale + x * x * bend), fy * x * y * bend],
@@ -151,7 +158,8 @@ impl Reprojection {
         let (arrived, bend) = (asymmetry.moved(place), asymmetry.by_place(place));
         self.pixel = [cx + fx * arrived.x, cy + fy * arrived.y];
         (self.by_lens[0], self.by_lens[1]) = ([arrived.x, 0.0], [0.0, arrived.y]);
-        for column in self.by_lens[4..=E1].iter_mut().chain(&mut self.by_point) {
+        let (before, further) = self.by_lens.split_at_mut(K5);
+        for column in before[4..=E1].iter_mut().chain(further).chain(&mut self.by_point) {
             let by = bend * Vector2::new(column[0] / fx, column[1] / fy);
             *column = [fx * by.x, fy * by.y];
         }
@@ -163,7 +171,8 @@ impl LensParameters {
     #[must_use]
     pub fn of(camera: &KannalaBrandt) -> Self {
         let foreign = camera.foreign_model().map(|_| *camera);
-        Self { central: camera.to_opencv(), pupil: camera.pupil(), asymmetry: camera.asymmetry(), foreign }
+        let (pupil, asymmetry, further) = (camera.pupil(), camera.asymmetry(), camera.further_terms());
+        Self { central: camera.to_opencv(), pupil, asymmetry, further, foreign }
     }
 
     /// The lens of the parameters alone: where these are unknowns, the images of another program's model are left.
@@ -177,17 +186,19 @@ impl LensParameters {
     pub const fn to_array(&self) -> [f64; LENS_PARAMETERS] {
         let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = self.central;
         let ([e0, e1], [p1, p2, s0, s1, s2, s3]) = (self.pupil.mm(), self.asymmetry.to_array());
-        [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3]
+        let [k5, k6] = self.further;
+        [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6]
     }
 
     /// The lens of [`Self::to_array`].
     #[must_use]
     pub const fn from_array(parameters: [f64; LENS_PARAMETERS]) -> Self {
-        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, asymmetry @ ..] = parameters;
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, further @ ..] = parameters;
         Self {
             central: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] },
             pupil: Pupil::from_mm([e0, e1]),
-            asymmetry: Asymmetry::from_array(asymmetry),
+            asymmetry: Asymmetry::from_array([p1, p2, s0, s1, s2, s3]),
+            further,
             foreign: None,
         }
     }
@@ -200,14 +211,14 @@ impl LensParameters {
         if let Some(camera) = self.foreign {
             return Ok(camera);
         }
-        let symmetric = KannalaBrandt::from_opencv(self.central, theta_max, size)?.with_pupil(self.pupil)?;
-        symmetric.with_asymmetry(self.asymmetry)
+        let symmetric = KannalaBrandt::from_opencv_with(self.central, self.further, theta_max, size)?;
+        symmetric.with_pupil(self.pupil)?.with_asymmetry(self.asymmetry)
     }
 }
 
 impl From<OpenCvFisheye> for LensParameters {
     fn from(central: OpenCvFisheye) -> Self {
-        Self { central, pupil: Pupil::default(), asymmetry: Asymmetry::default(), foreign: None }
+        Self { central, pupil: Pupil::default(), asymmetry: Asymmetry::default(), further: [0.0; 2], foreign: None }
     }
 }
 

@@ -16,7 +16,8 @@ pub struct IntrinsicsCalibration {
     /// The lens with its valid cone: the angle to the axis of the outermost corner used and 5 % more, but less than the
     /// angle where r(θ) stops growing.
     pub camera: KannalaBrandt,
-    /// The same lens in the parameters that were estimated, without its pupil and its asymmetry. [`KannalaBrandt`] holds them rescaled: its five
+    /// The same lens in the parameters that were estimated, without its pupil, its asymmetry and its further radial
+    /// terms. [`KannalaBrandt`] holds them rescaled: its five
     /// coefficients are fx (1, k1, k2, k3, k4) in pixels, its aspect is fy / fx.
     pub opencv: OpenCvFisheye,
     /// What the views say of the pupil; its coefficients are those of `camera`.
@@ -67,6 +68,7 @@ impl IntrinsicsCalibration {
             central: self.opencv,
             pupil: self.camera.pupil(),
             asymmetry: self.camera.asymmetry(),
+            further: self.camera.further_terms(),
             foreign: None,
         }
     }

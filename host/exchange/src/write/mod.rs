@@ -7,6 +7,7 @@ mod mrcal;
 mod opencv;
 mod ros;
 mod sensor;
+mod spline_fit;
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -175,8 +176,8 @@ fn holdable(
         return Ok(central);
     }
     remarks.push(format!(
-        "The pupil of the {side} lens moves (e0 = {:.3} mm), or it is not symmetric about its axis, which this format cannot say. The lens \
-         that is written images points {:.0} mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away \
+        "The pupil of the {side} lens moves (e0 = {:.3} mm), it is not symmetric about its axis, or its radius has terms \
+         beyond θ⁹, which this format cannot say. The lens that is written images points {:.0} mm away as it does to {:.3} px; points 200 mm away are up to {:.2} px off, points 2 m away \
          {:.2} px.",
         lens.pupil().e0.mm(),
         LIKE_AT.mm(),

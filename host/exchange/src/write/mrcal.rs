@@ -1,8 +1,9 @@
 //! A `.cameramodel` of mrcal for each camera. mrcal has no polynomial fisheye model: a splined stereographic one is fitted.
 
 use nalgebra::Vector3;
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, SplineFit, UnitRay, fit_spline};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, UnitRay};
 
+use super::spline_fit::{SplineFit, fit_spline};
 use super::{Cameras, WrittenFile, each};
 use crate::ExchangeError;
 use crate::pose::METRE;

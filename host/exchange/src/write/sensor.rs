@@ -20,10 +20,10 @@ pub struct Sensor {
 
 impl Sensor {
     /// A fisheye camera, as in TUM-VI: the model `equidistant`, which is that of Kannala and Brandt with four coefficients. Of a lens that is more than
-    /// that ([`KannalaBrandt::fits_opencv`]) only this part is written.
+    /// that ([`KannalaBrandt::fits_opencv`]) only this part is written, with the radius that comes nearest.
     #[must_use]
     pub fn fisheye(lens: &KannalaBrandt) -> Self {
-        let OpenCvFisheye { fx, fy, cx, cy, k } = lens.to_opencv();
+        let OpenCvFisheye { fx, fy, cx, cy, k } = lens.nearest_opencv();
         let theta_max_deg = Some(lens.theta_max().deg());
         Self { theta_max_deg, ..Self::new(lens.size(), [fx, fy, cx, cy], ("equidistant", k)) }
     }

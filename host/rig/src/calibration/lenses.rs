@@ -1,9 +1,10 @@
 //! What the file of a rig states of its lenses' errors, and lenses that are extrapolated by it.
 
 use nalgebra::SMatrix;
-use vergence_vision::{LENS_PARAMETERS, LensField, Side};
+use vergence_vision::{LENS_PARAMETERS, Side};
 
 use super::{RigCalibration, RigNumber};
+use crate::LensField;
 use crate::rig::Rig;
 
 /// A rig whose file does not say how far its lenses may be off.

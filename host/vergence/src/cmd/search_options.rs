@@ -1,8 +1,8 @@
 //! Where in both images points are sought.
 
 use vergence_pipeline::Search;
-use vergence_rig::Rig;
-use vergence_vision::{Length, LensField};
+use vergence_rig::{LensField, Rig};
+use vergence_vision::Length;
 
 use super::mask_options::MaskOptions;
 use crate::failure::Failure;

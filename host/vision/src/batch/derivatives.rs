@@ -14,12 +14,12 @@ const NUMBERS: usize = 12;
 /// Rows per step: with more, the columns do not fit the registers and the first cache.
 const LANES: usize = 16;
 
-/// The parameters of a lens that projection with derivatives needs.
+/// The parameters of a lens that projection with derivatives needs, with so many coefficients of the radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Derivatives {
-    k: [f64; 5],
+pub(super) struct Derivatives<const TERMS: usize> {
+    k: [f64; TERMS],
     /// The factors of dr/dθ: (2 i + 1) k_i.
-    slope: [f64; 5],
+    slope: [f64; TERMS],
     aspect: f64,
     centre: [f64; 2],
     theta_max: f64,
@@ -85,9 +85,9 @@ impl ProjectedPoints {
     }
 }
 
-impl Derivatives {
-    pub(super) fn new(lens: &KannalaBrandt) -> Self {
-        let (k, centre) = (lens.k(), lens.centre());
+impl<const TERMS: usize> Derivatives<TERMS> {
+    pub(super) fn new(lens: &KannalaBrandt, k: [f64; TERMS]) -> Self {
+        let centre = lens.centre();
         let mut slope = k;
         for (i, factor) in slope.iter_mut().enumerate() {
             *factor *= (2 * i + 1) as f64;
@@ -124,7 +124,7 @@ impl Derivatives {
     }
 }
 
-impl Kernel<3, NUMBERS> for Derivatives {
+impl<const TERMS: usize> Kernel<3, NUMBERS> for Derivatives<TERMS> {
     /// With the radius r(θ), the unit vector (c, s) from the axis to the point and R² = x² + y² + z²: u = cx + r c, and
     /// dθ = (z dρ − ρ dz) / R².
     #[inline(always)]
@@ -168,7 +168,7 @@ impl Kernel<3, NUMBERS> for Derivatives {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2+fma", "x86_64+avx2+fma"))]
-fn derive_best(lens: &Derivatives, points: &[[f64; 3]], rows: &mut Vec<[f64; NUMBERS]>) {
+fn derive_best<const TERMS: usize>(lens: &Derivatives<TERMS>, points: &[[f64; 3]], rows: &mut Vec<[f64; NUMBERS]>) {
     if target_cfg_f!(target_feature = "fma") {
         for_rows::<true, LANES, 3, NUMBERS>(lens, points, rows);
     } else {

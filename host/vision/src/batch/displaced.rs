@@ -63,13 +63,15 @@ impl Displaced {
         }
     }
 
-    /// Appends where the symmetric lens would image the light that arrives at `pixels`.
-    pub(super) fn replace(&self, pixels: &[[f64; 2]], best: bool, symmetric: &mut Vec<[f64; 2]>) {
+    /// Where the symmetric lens would image the light that arrives at `pixels`.
+    pub(super) fn replace(&self, pixels: &[[f64; 2]], best: bool) -> Vec<[f64; 2]> {
+        let mut symmetric = Vec::new();
         if best {
-            replace_best(self, pixels, symmetric);
+            replace_best(self, pixels, &mut symmetric);
         } else {
-            for_rows::<ALWAYS_FUSED, LANES, 2, 2>(self, pixels, symmetric);
+            for_rows::<ALWAYS_FUSED, LANES, 2, 2>(self, pixels, &mut symmetric);
         }
+        symmetric
     }
 
     /// m by m'.

@@ -1,15 +1,17 @@
 //! A lens prepared for whole arrays of points and pixels.
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::Instructions;
 use super::derivatives::{Derivatives, ProjectedPoints};
 use super::displaced::Displaced;
 use super::foreign::{Foreign, by_chunks};
-use super::project::{Project, project_baseline, project_best};
+use super::project::{Project, further_baseline, further_best, project_baseline, project_best};
 use super::pupil::{ProjectByPupil, UnprojectByPupil, project_by_pupil, unproject_by_pupil};
 use super::radial::{ForeignRadial, ProjectRadial, radial_baseline, radial_best};
 use super::unproject::{Unproject, unproject_baseline, unproject_best};
+use crate::radial_series::TERMS;
 use crate::{Asymmetry, Camera, KannalaBrandt, Pixel, Point, UnitRay};
 
 /// A [`KannalaBrandt`] lens prepared for whole arrays of points and pixels, about ten times faster.
@@ -20,10 +22,12 @@ use crate::{Asymmetry, Camera, KannalaBrandt, Pixel, Point, UnitRay};
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchLens {
     lens: KannalaBrandt,
-    project: Project,
+    project: Project<5>,
     /// Of a symmetric lens of another model.
     radial: Option<ProjectRadial>,
-    derivatives: Derivatives,
+    derivatives: Derivatives<5>,
+    /// Of a lens with further radial terms, in the place of the other two.
+    further: Option<(Project<TERMS>, Derivatives<TERMS>)>,
     displaced: Option<Displaced>,
     unproject: Option<Unproject>,
     /// Of a lens of this program's own model with a moving pupil; made where it is asked for.
@@ -43,13 +47,15 @@ impl BatchLens {
             Some(_) => radial.as_ref().and_then(Unproject::of_growing),
             None => Unproject::new(lens),
         };
+        let further = || (Project::new(lens, lens.series().terms()), Derivatives::new(lens, lens.series().terms()));
         let foreign = if radial.is_some() && unproject.is_some() { None } else { Foreign::new(lens) };
         Self {
             lens: *lens,
             foreign,
-            project: Project::new(lens),
+            project: Project::new(lens, lens.k()),
             radial: radial.as_ref().and_then(ProjectRadial::new),
-            derivatives: Derivatives::new(lens),
+            derivatives: Derivatives::new(lens, lens.k()),
+            further: lens.has_further_terms().then(further),
             displaced: Displaced::new(lens),
             by_pupil: OnceLock::new(),
             back_by_pupil: OnceLock::new(),
@@ -86,9 +92,11 @@ impl BatchLens {
             return;
         }
         let first = pixels.len();
-        match self.instructions {
-            Instructions::Best => project_best(&self.project, points, pixels),
-            Instructions::Baseline => project_baseline(&self.project, points, pixels),
+        match &self.further {
+            None if self.is_best() => project_best(&self.project, points, pixels),
+            None => project_baseline(&self.project, points, pixels),
+            Some((project, _)) if self.is_best() => further_best(project, points, pixels),
+            Some((project, _)) => further_baseline(project, points, pixels),
         }
         self.displace(pixels, first);
     }
@@ -149,7 +157,10 @@ impl BatchLens {
     /// Like [`Self::project_with_derivatives`], but replaces what is in `out` and keeps its memory. In memory that was used before,
     /// a large array takes much less time than in new memory, whose pages the system must clear.
     pub fn project_with_derivatives_into(&self, points: &[[f64; 3]], out: &mut ProjectedPoints) {
-        self.derivatives.of(points, self.instructions == Instructions::Best, out);
+        match &self.further {
+            None => self.derivatives.of(points, self.is_best(), out),
+            Some((_, derivatives)) => derivatives.of(points, self.is_best(), out),
+        }
         if self.lens.foreign_model().is_some() {
             out.make_foreign(&self.lens, points);
         }
@@ -167,13 +178,8 @@ impl BatchLens {
     /// Like [`Self::unproject`], but appends the results to `rays`.
     pub fn unproject_into(&self, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {
         // What the polynomial of a lens of another model has of asymmetry is none of that model.
-        if self.lens.is_symmetric() || self.lens.foreign_model().is_some() {
+        if self.lens.foreign_model().is_some() {
             return self.unproject_symmetric(pixels, rays);
-        }
-        if let Some(displaced) = &self.displaced {
-            let mut symmetric = Vec::new();
-            displaced.replace(pixels, self.is_best(), &mut symmetric);
-            return self.unproject_symmetric(&symmetric, rays);
         }
         self.unproject_symmetric(&self.symmetric(pixels), rays);
     }
@@ -201,23 +207,19 @@ impl BatchLens {
             };
             return rays.extend(self.unproject(pixels).iter().map(shift));
         };
-        match &self.displaced {
-            Some(displaced) => {
-                let mut symmetric = Vec::new();
-                displaced.replace(pixels, self.is_best(), &mut symmetric);
-                unproject_by_pupil(pupil, self.is_best(), &symmetric, rays);
-            }
-            None if self.lens.is_symmetric() => unproject_by_pupil(pupil, self.is_best(), pixels, rays),
-            None => unproject_by_pupil(pupil, self.is_best(), &self.symmetric(pixels), rays),
-        }
+        unproject_by_pupil(pupil, self.is_best(), &self.symmetric(pixels), rays);
     }
 
-    /// The pixels of the symmetric lens, one by one.
-    fn symmetric(&self, pixels: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let symmetric = |&[u, v]: &[f64; 2]| {
+    /// The pixels of the symmetric lens.
+    fn symmetric<'a>(&self, pixels: &'a [[f64; 2]]) -> Cow<'a, [[f64; 2]]> {
+        let one = |&[u, v]: &[f64; 2]| {
             self.lens.without_displacement(Pixel { u, v }).map_or([f64::NAN; 2], |pixel| [pixel.u, pixel.v])
         };
-        pixels.iter().map(symmetric).collect()
+        match &self.displaced {
+            Some(displaced) => Cow::Owned(displaced.replace(pixels, self.is_best())),
+            None if self.lens.is_symmetric() => Cow::Borrowed(pixels),
+            None => pixels.iter().map(one).collect(),
+        }
     }
 
     fn unproject_symmetric(&self, pixels: &[[f64; 2]], rays: &mut Vec<[f64; 3]>) {

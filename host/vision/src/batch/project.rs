@@ -7,23 +7,23 @@ use crate::KannalaBrandt;
 /// Rows per step. Fewer are slower: the three columns of a row-major array are read best in long runs.
 const LANES: usize = 32;
 
-/// The parameters of a lens that projection needs.
+/// The parameters of a lens that projection needs, with so many coefficients of the radius.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Project {
-    k: [f64; 5],
+pub(super) struct Project<const TERMS: usize> {
+    k: [f64; TERMS],
     aspect: f64,
     centre: [f64; 2],
     theta_max: f64,
 }
 
-impl Project {
-    pub(super) fn new(lens: &KannalaBrandt) -> Self {
+impl<const TERMS: usize> Project<TERMS> {
+    pub(super) fn new(lens: &KannalaBrandt, k: [f64; TERMS]) -> Self {
         let centre = lens.centre();
-        Self { k: lens.k(), aspect: lens.aspect(), centre: [centre.u, centre.v], theta_max: lens.theta_max().rad() }
+        Self { k, aspect: lens.aspect(), centre: [centre.u, centre.v], theta_max: lens.theta_max().rad() }
     }
 }
 
-impl Kernel<3, 2> for Project {
+impl<const TERMS: usize> Kernel<3, 2> for Project<TERMS> {
     #[inline(always)]
     fn lanes<const FUSED: bool, const W: usize>(&self, [x, y, z]: [[f64; W]; 3]) -> [[f64; W]; 2] {
         let (rho, theta) = distance_and_angle::<FUSED, W>(&[x, y, z]);
@@ -66,4 +66,5 @@ pub(super) fn pixels<const W: usize>(
     [u, v]
 }
 
-over_rows!(project_baseline, project_best, Project, LANES, 3 => 2);
+over_rows!(project_baseline, project_best, Project<5>, LANES, 3 => 2);
+over_rows!(further_baseline, further_best, Project<{ crate::radial_series::TERMS }>, LANES, 3 => 2);

@@ -87,7 +87,7 @@ impl ProjectByPupil {
             return lens.k()[0];
         }
         let seen = lens.pupil().seen(sine / inverse, cosine / inverse);
-        seen.map_or(f64::NAN, |seen| lens.radius_at(seen.theta) / sine)
+        seen.map_or(f64::NAN, |seen| lens.series().radius(seen.theta) / sine)
     }
 }
 

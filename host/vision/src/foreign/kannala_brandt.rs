@@ -12,7 +12,9 @@ impl CameraModel for KannalaBrandt {
 
     fn parameters(&self) -> Vec<ModelParameter> {
         let OpenCvFisheye { fx, fy, cx, cy, k } = self.to_opencv();
-        let values = [&[fx, fy, cx, cy][..], &k, &self.pupil().mm(), &self.asymmetry().to_array()].concat();
+        let values =
+            [&[fx, fy, cx, cy][..], &k, &self.pupil().mm(), &self.asymmetry().to_array(), &self.further_terms()]
+                .concat();
         let unit = |index| match index {
             0..4 => ParameterUnit::Pixels,
             8 | 9 => ParameterUnit::Millimetres,

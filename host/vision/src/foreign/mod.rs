@@ -15,7 +15,6 @@ mod named;
 mod ocam;
 mod pinhole;
 mod splined;
-mod splined_fit;
 mod steps;
 
 use std::fmt::Debug;
@@ -32,7 +31,6 @@ pub use self::named::model_of;
 pub use self::ocam::OCam;
 pub use self::pinhole::{Pinhole, Radtan};
 pub use self::splined::{SplineGrid, SplinedStereographic};
-pub use self::splined_fit::{SplineFit, fit_spline};
 pub use self::steps::LensSteps;
 pub(crate) use self::steps::{AngleLaw, OntoPlane};
 use crate::{Angle, Camera, KannalaBrandt, OutsideField, Pixel, Point, UnitRay};

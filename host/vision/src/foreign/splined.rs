@@ -81,7 +81,8 @@ impl SplinedStereographic {
     }
 
     /// The control points that act at u, by their index, and the weight of each; `None` beyond the edge.
-    pub(super) fn weights(&self, u: [f64; 2]) -> Option<Vec<(usize, f64)>> {
+    #[must_use]
+    pub fn weights(&self, u: [f64; 2]) -> Option<Vec<(usize, f64)>> {
         let SplineGrid { columns, order, .. } = self.grid;
         let ([left, top], [across, down]) = self.place(u)?;
         let used = || (0..=order).flat_map(|row| (0..=order).map(move |column| (row, column)));

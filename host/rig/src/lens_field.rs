@@ -9,7 +9,7 @@ pub enum LensField {
     /// The part in which the lens was measured.
     #[default]
     Measured,
-    /// All for which its model is valid: see [`crate::KannalaBrandt::extrapolated`].
+    /// All for which its model is valid: see [`vergence_vision::KannalaBrandt::extrapolated`].
     Extrapolated,
 }
 

@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Formula, NoFit, SplineGrid, SplinedStereographic};
-use crate::{Camera, InvalidLens, KannalaBrandt, Pixel, UnitRay};
+use vergence_vision::{
+    Camera, Formula, InvalidLens, KannalaBrandt, NoFit, Pixel, SplineGrid, SplinedStereographic, UnitRay,
+};
 
 /// A splined model in place of a lens, and how far it is off over the image.
 #[derive(Clone, Debug, PartialEq)]
