@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fail, and shows its figures")]
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, SVector, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use vergence_calibration::{
@@ -14,10 +14,16 @@ use vergence_vision::{Camera, ImageSize, LENS_PARAMETERS, Pixel, Point};
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
 const CENTRAL: [f64; LENS_PARAMETERS] =
-    [599.1, 600.2, 1021.0, 1027.5, -0.052, 0.0041, -0.0019, 0.0002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    [599.1, 600.2, 1021.0, 1027.5, -0.052, 0.0041, -0.0019, 0.0002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 /// About those of a Sigma lens, and of one with elements some micrometres off the axis.
 const PUPIL: [f64; LENS_PARAMETERS] = with(CENTRAL, [2.8, 0.0], [0.0; 6]);
 const FULL: [f64; LENS_PARAMETERS] = with(CENTRAL, [2.8, 0.7], [4e-4, -3e-4, 5e-4, -1e-4, -4e-4, 2e-4]);
+
+/// A radius that five terms are up to 0.15 px off.
+const LONGER: [f64; LENS_PARAMETERS] = [
+    598.1, 599.2, 1021.0, 1027.5, -0.0408, -0.0176, 0.0153, -0.0057, 2.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 7.5e-4,
+    -2e-5,
+];
 
 const fn with(
     mut lens: [f64; LENS_PARAMETERS],
@@ -76,7 +82,7 @@ fn has(calibration: &IntrinsicsCalibration, step: LensStep) -> bool {
 }
 
 fn finds_more(calibration: &IntrinsicsCalibration) -> bool {
-    [LensStep::PupilGrowth, LensStep::Asymmetry].into_iter().any(|step| has(calibration, step))
+    [LensStep::PupilGrowth, LensStep::Asymmetry, LensStep::FurtherTerms].into_iter().any(|step| has(calibration, step))
 }
 
 fn seeds(usual: u64) -> u64 {
@@ -100,6 +106,37 @@ fn one_lens_in_twenty_at_most_is_found_richer_than_it_is() {
     assert!(20 * richer <= 2 * seeds && poorer == 0, "{richer} of {} richer, {poorer} poorer", 2 * seeds);
 }
 
+/// The errors of the parameters that a lens with further radial terms has agree with their covariance: the normalised square, for each, is 1.
+#[test]
+fn further_terms_of_the_radius_are_found_with_their_covariance() {
+    let seeds = seeds(10);
+    let (mut found, mut square, mut unknowns) = (0, 0.0, 0);
+    for seed in 0..seeds {
+        let calibration = calibrated(LONGER, 3000 + seed);
+        if !has(&calibration, LensStep::FurtherTerms) {
+            continue;
+        }
+        found += 1;
+        let (values, covariance) = (calibration.lens().to_array(), &calibration.covariance);
+        let unknown: Vec<usize> = (0..LENS_PARAMETERS).filter(|&i| covariance[(i, i)] > 0.0).collect();
+        assert!(unknown.ends_with(&[16, 17]) && calibration.camera.has_further_terms());
+        // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
+        let sigma = |i: usize| covariance[(i, i)].sqrt();
+        let count = unknown.len();
+        let correlation = DMatrix::from_fn(count, count, |row, column| {
+            let (i, k) = (unknown[row], unknown[column]);
+            covariance[(i, k)] / (sigma(i) * sigma(k))
+        });
+        let error = DVector::from_iterator(count, unknown.iter().map(|&i| (values[i] - LONGER[i]) / sigma(i)));
+        square += error.dot(&correlation.cholesky().unwrap().solve(&error));
+        unknowns += count;
+    }
+    let each = square / unknowns as f64;
+    println!("{found} of {seeds} found; normalised square of each parameter {each:.2}");
+    assert!(10 * found >= 9 * seeds, "{found} of {seeds} found");
+    assert!((0.6..1.4).contains(&each), "{each} of 1");
+}
+
 /// The errors of all parameters of a full lens agree with their covariance, whose normalised square has the mean 16 and over n draws the
 /// standard deviation (32 / n)^(1/2).
 #[test]
@@ -113,10 +150,12 @@ fn a_lens_with_all_parameters_is_found_with_its_covariance() {
             continue;
         }
         found += 1;
-        let error = nalgebra::SVector::from(calibration.lens().to_array()) - nalgebra::SVector::from(FULL);
+        let error = SVector::from(calibration.lens().to_array()) - SVector::from(FULL);
+        // What such a lens does not have is left out.
+        let (error, covariance) = (error.fixed_rows::<16>(0), calibration.covariance.fixed_view::<16, 16>(0, 0));
         // Scaled to unit diagonal: the parameters differ by many orders of magnitude.
-        let scale = calibration.covariance.diagonal().map(f64::sqrt);
-        let correlation = calibration.covariance.component_div(&(scale * scale.transpose()));
+        let scale = covariance.diagonal().map(f64::sqrt);
+        let correlation = covariance.component_div(&(scale * scale.transpose()));
         let error = error.component_div(&scale);
         nees += error.dot(&correlation.cholesky().unwrap().solve(&error));
     }

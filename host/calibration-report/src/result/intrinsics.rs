@@ -5,8 +5,26 @@ use vergence_calibration::{IntrinsicsCalibration, LensStep, PupilEvidence, StepE
 use vergence_targets::TargetView;
 use vergence_vision::{CENTRAL_PARAMETERS, LENS_PARAMETERS};
 
-const NAMES: [&str; LENS_PARAMETERS] =
-    ["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4", "pupil_e0_mm", "pupil_e1_mm", "p1", "p2", "s0", "s1", "s2", "s3"];
+const NAMES: [&str; LENS_PARAMETERS] = [
+    "fx",
+    "fy",
+    "cx",
+    "cy",
+    "k1",
+    "k2",
+    "k3",
+    "k4",
+    "pupil_e0_mm",
+    "pupil_e1_mm",
+    "p1",
+    "p2",
+    "s0",
+    "s1",
+    "s2",
+    "s3",
+    "k5",
+    "k6",
+];
 
 /// How the target bows.
 #[must_use]
@@ -70,6 +88,7 @@ pub fn step_in_words(evidence: &StepEvidence) -> String {
     let what = match step {
         LensStep::PupilGrowth => "a pupil with e1",
         LensStep::Asymmetry => "decentring p and thin prism s",
+        LensStep::FurtherTerms => "terms k5 and k6 of its radius",
         LensStep::TargetBow => "a bow",
     };
     let (has, like) = match step {
@@ -88,6 +107,9 @@ pub fn step_in_words(evidence: &StepEvidence) -> String {
             "the views do not tell {what}: chi-squared falls by {gain:.1} (30 are asked for), {figures}. It counts as unknown within \
              what is usual, and makes the lens less certain by that"
         ),
+        StepVerdict::Absent if *step == LensStep::FurtherTerms => format!(
+            "the lens keeps a radius of five terms: with two more chi-squared would fall by {gain:.1} (30 are asked for){held_out}"
+        ),
         StepVerdict::Absent => format!(
             "the {has} does not have {what}: chi-squared would fall by {gain:.1} only, and the views would show that of {like}"
         ),
@@ -99,6 +121,7 @@ fn steps_json(steps: &[StepEvidence]) -> Value {
         let terms = match evidence.step {
             LensStep::PupilGrowth => "pupil_e1",
             LensStep::Asymmetry => "tangential_and_prism",
+            LensStep::FurtherTerms => "radial_k5_and_k6",
             LensStep::TargetBow => "target_bow",
         };
         let [without, with] = evidence.rms_px;

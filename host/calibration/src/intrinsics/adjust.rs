@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
-use super::lens::{CENTRAL, E0, E1, LENS, LensParameters};
+use super::lens::{CENTRAL, E0, E1, K5, LENS, LensParameters};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
 use super::prior::{FINEST, Prior, Strength};
 use super::start::Start;
@@ -50,23 +50,25 @@ pub(super) struct Terms {
     pub e0: bool,
     pub e1: bool,
     pub asymmetry: bool,
+    /// k5 and k6.
+    pub further: bool,
     pub bow: bool,
 }
 
 impl Terms {
     /// A lens with one centre.
     pub const fn central(bow: bool) -> Self {
-        Self { e0: false, e1: false, asymmetry: false, bow }
+        Self { e0: false, e1: false, asymmetry: false, further: false, bow }
     }
 
     /// A lens with a pupil of one coefficient.
     pub const fn pupil(bow: bool) -> Self {
-        Self { e0: true, e1: false, asymmetry: false, bow }
+        Self { e0: true, e1: false, asymmetry: false, further: false, bow }
     }
 
-    /// A lens with everything that lenses may have.
+    /// A lens with everything that lenses may have besides a radius of more terms.
     pub const fn whole(bow: bool) -> Self {
-        Self { e0: true, e1: true, asymmetry: true, bow }
+        Self { e0: true, e1: true, asymmetry: true, further: false, bow }
     }
 
     /// The parameters adjusted at the end.
@@ -75,6 +77,7 @@ impl Terms {
             E0 => self.e0,
             E1 => self.e1,
             LENS.. => self.bow,
+            K5.. => self.further,
             other => other < CENTRAL || self.asymmetry,
         };
         (0..SHARED).filter(|&parameter| has(parameter)).collect()

@@ -24,8 +24,8 @@ use super::observations::ObservedView;
 use super::prior::{BOW, Prior, Strength, narrowest};
 use super::pupil;
 use super::report::outermost;
-use super::trial::{TEN, Trial, scatter};
-use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence};
+use super::trial::{TEN, Trial, held_out_px, scatter};
+use super::{IntrinsicsError, IntrinsicsOptions, LensModel, PupilEvidence, further};
 use crate::Loss;
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, linearise};
@@ -47,6 +47,8 @@ pub enum LensStep {
     PupilGrowth,
     /// Decentring p1, p2 and thin prism s0 to s3.
     Asymmetry,
+    /// Terms k5 and k6 of the radius beyond θ⁹.
+    FurtherTerms,
     /// The bow of the target, which a lens that fits it for flat takes into its own parameters.
     TargetBow,
 }
@@ -104,13 +106,27 @@ pub(super) fn fit(
     // The richest lens may be one too many for a handful of corners.
     let richest = candidates.iter().find_map(|terms| Richest::of(&central, *terms, size, options));
     let none = Evidence { pupil: PupilEvidence::NotAsked, steps: Vec::new() };
-    let (richer, evidence) = richest.map_or(Ok((None, none)), Richest::judged)?;
+    let (richer, mut evidence) = richest.map_or(Ok((None, none)), Richest::judged)?;
+    let central_found = Found { terms: Terms::central(options.warp), prior: None };
+    let found = richer.as_ref().map_or(central_found, |(_, found)| *found);
     let adjusted = match richer {
-        Some(adjusted) => adjusted,
+        Some((adjusted, _)) => adjusted,
         None if is_start => central_fit(central.views.clone(), central.state(), &EXACT)?.after(&central),
         None => central,
     };
+    if options.model != LensModel::ByEvidence {
+        return Ok((adjusted, evidence));
+    }
+    let (adjusted, further) = further::judged(adjusted, found, size, options);
+    evidence.steps.extend(further);
     Ok((adjusted, evidence))
+}
+
+/// The lens that is found, before a radius of more terms is asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Found {
+    pub terms: Terms,
+    pub prior: Option<Prior>,
 }
 
 /// The fit of the richest lens.
@@ -189,15 +205,11 @@ impl<'a> Richest<'a> {
 
     /// The residuals of views held out, without and with the parameters in question.
     pub fn held_out_px(&self, without: &Trial, with: &Trial) -> [f64; 2] {
-        let foretold = [without, with].map(|lens| lens.foretold(&self.adjusted));
-        match foretold {
-            [Some(without), Some(with)] if without.is_told_from(&with) => [without.px, with.px],
-            _ => [without, with].map(|lens| lens.fitted_px(&self.adjusted)),
-        }
+        held_out_px(&self.adjusted, without, with)
     }
 
     /// The adjustment with the lens that is left, unless that has one centre, and the evidence.
-    fn judged(self) -> Result<(Option<Adjusted>, Evidence), IntrinsicsError> {
+    fn judged(self) -> Result<(Option<(Adjusted, Found)>, Evidence), IntrinsicsError> {
         let pupil = pupil::evidence(&self);
         let has_pupil = !matches!(pupil, PupilEvidence::Central { .. });
         let (mut terms, mut steps) =
@@ -218,13 +230,14 @@ impl<'a> Richest<'a> {
         let adjusted = if terms == Terms::central(self.options.warp) {
             None
         } else if terms == self.terms && !terms.asymmetry {
-            Some(self.adjusted)
+            Some((self.adjusted, Found { terms, prior: Some(self.prior) }))
         } else {
             let prior = Prior { mounting: mounting(&self.adjusted, self.variance).unwrap_or(1.0), ..self.prior };
             let strength = self.adjusted.strength.map(|strength| strength.mounted(prior));
             let start = self.adjusted.linear().start(&self.adjusted.views, terms, strength);
             let (views, arrow) = (self.adjusted.views.clone(), (self.options, &EXACT));
-            Some(inlier_fit(views, start, terms.free(), Some(prior), arrow)?.after(&self.adjusted))
+            let adjusted = inlier_fit(views, start, terms.free(), Some(prior), arrow)?.after(&self.adjusted);
+            Some((adjusted, Found { terms, prior: Some(prior) }))
         };
         Ok((adjusted, Evidence { pupil, steps }))
     }
@@ -251,7 +264,7 @@ impl<'a> Richest<'a> {
     /// than chance gives.
     fn is_absent(&self, step: LensStep, gain: f64, with: &Trial) -> bool {
         let (chance, left) = match step {
-            LensStep::PupilGrowth => return false,
+            LensStep::PupilGrowth | LensStep::FurtherTerms => return false,
             LensStep::Asymmetry => (CHANCE_OF_ASYMMETRY, narrowest(&self.adjusted, self.variance)),
             LensStep::TargetBow => {
                 let sigma_mm = |parameter| with.sigma(parameter, self.variance);

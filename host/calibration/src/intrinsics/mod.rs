@@ -5,10 +5,12 @@
 //! 3. Plain least squares on the remaining corners: the result and its covariance.
 //! 4. The same with all that a lens may have besides, within what is known of lenses (`prior`): a pupil that moves (`pupil`), elements off
 //!    the axis, a target that bows. What the views tell to be absent is left out again (`ladder`).
+//! 5. The lens that is left with two more terms of its radius, where the views ask for them (`further`).
 
 mod adjust;
 mod bundle;
 mod foretold;
+mod further;
 mod held_out;
 mod ladder;
 mod lens;

@@ -142,6 +142,14 @@ impl Trial {
     }
 }
 
+/// The residuals in pixels of views of `adjusted` that are held out: by one lens, and by another.
+pub(super) fn held_out_px(adjusted: &Adjusted, one: &Trial, other: &Trial) -> [f64; 2] {
+    match [one, other].map(|lens| lens.foretold(adjusted)) {
+        [Some(one), Some(other)] if one.is_told_from(&other) => [one.px, other.px],
+        _ => [one, other].map(|lens| lens.fitted_px(adjusted)),
+    }
+}
+
 fn rms_px(views: &[ObservedView], shared: &Shared, poses: &[Isometry3<f64>]) -> f64 {
     let of_view = |(view, pose): (&ObservedView, &Isometry3<f64>)| {
         view.used().map(|corner| shared.residual_px(pose, corner).powi(2)).sum::<f64>()
