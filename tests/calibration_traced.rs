@@ -246,11 +246,12 @@ fn clouds_through_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
     }
 }
 
-/// What the shape of the lens costs, where next to nothing is noisy: a moving pupil leaves little of it, one centre much.
+/// What the shape of the lens costs, where next to nothing is noisy: one centre leaves much of it, a moving pupil little, and two more terms of the
+/// radius, which the views ask for with `sigma8_f18`, next to nothing.
 #[test]
 fn without_noise_a_moving_pupil_leaves_little_error() {
     let models = ["by-evidence", "moving-pupil", "central"];
-    for (design, most_mm) in [("sigma8_f18", [0.05, 0.06]), ("nikkor6_f28", [0.005, 0.1])] {
+    for (design, most_mm) in [("sigma8_f18", [0.005, 0.06]), ("nikkor6_f28", [0.005, 0.15])] {
         let optics = Optics { design, mounted: None, views: views(20), bow_mm: 0.0 };
         for seed in 0..seeds(1) {
             let found = trial(seed, optics, EXACT, models).map(|modes| modes.map(|found| found.error_mm));

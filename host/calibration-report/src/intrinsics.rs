@@ -247,6 +247,7 @@ impl<'a> Report<'a> {
         let mut rows: Vec<Row> = names
             .iter()
             .flatten()
+            .chain(&[("k5", ""), ("k6", "")])
             .zip(found.lens().to_array())
             .enumerate()
             .filter(|(index, _)| estimated(*index))
@@ -256,7 +257,8 @@ impl<'a> Report<'a> {
             rows.push(row("target bow along x", warp.shape.along_x_mm, warp.sigma_mm[0], "mm"));
             rows.push(row("target bow along y", warp.shape.along_y_mm, warp.sigma_mm[1], "mm"));
         }
-        let explanation = "r = f·θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸), as cv::fisheye and Kalibr's equidistant model. \
+        let explanation = "r = f·θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸), as cv::fisheye and Kalibr's equidistant model, and k5·θ¹⁰ + k6·θ¹² \
+                           where they are stated. \
                            σ comes from the noise of the corners, with target poses free. k1 to k4 depend on each \
                            other: two calibrations may differ in them and agree in every ray. Compare rays, not coefficients. \
                            The ray at θ starts (e0 + e1·θ²)·(θ / sin θ − 1) ahead of the origin. p and s move its image m, in focal \
