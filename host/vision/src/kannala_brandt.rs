@@ -261,9 +261,9 @@ impl KannalaBrandt {
         for _ in 0..60 {
             let error = self.series.radius(theta) - r;
             if error > 0.0 {
-                high = theta
+                high = theta;
             } else {
-                low = theta
+                low = theta;
             }
             let newton = theta - error / self.series.slope(theta);
             let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
