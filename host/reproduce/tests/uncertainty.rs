@@ -25,6 +25,8 @@ const LENS: [f64; LENS_PARAMETERS] = [
 ];
 const LENS_SIGMA: [f64; LENS_PARAMETERS] =
     [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02, 0.02, 2e-5, 2e-5, 2e-5, 1e-5, 2e-5, 1e-5, 1e-6, 3e-7];
+/// Index of the first of the further radial terms.
+const FURTHER: usize = LENS_PARAMETERS - 2;
 const POSE_SIGMA: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
 
 fn lens_of(parameters: &[f64]) -> KannalaBrandt {
@@ -77,7 +79,8 @@ fn lens_derivatives_agree_with_differences() {
         assert!((by_pixel.column(1) - by_v).amax() < 1e-10, "{theta}");
         let by_lens = lens.pixel_by_lens(&ray);
         for i in 0..LENS_PARAMETERS {
-            let step = 1e-2 * LENS_SIGMA[i];
+            // Pixels are linear in the further terms, which hardly move them near the axis.
+            let step = if i < FURTHER { 1e-2 * LENS_SIGMA[i] } else { 1e-6 };
             let seen = |sign: f64| {
                 let mut parameters = LENS;
                 parameters[i] += sign * step;
@@ -104,10 +107,13 @@ fn the_derivative_by_shared_errors_agrees_with_differences() {
         let uncertainty = PointUncertainty::by(&kernel, &truth, &pair, 0.1).unwrap();
         for i in 0..SHARED_PARAMETERS {
             let step = 0.1 * if i < POSE { LENS_SIGMA[i % LENS_PARAMETERS] } else { POSE_SIGMA[i - POSE] };
+            let found = uncertainty.by_shared.column(i);
+            // The further terms hardly move points near the axis, and those at the rim by kilometres for one.
+            let is_further = i < POSE && i % LENS_PARAMETERS >= FURTHER;
+            let step = if is_further { f64::min(1e-5, 1e-3 / found.norm()) } else { step };
             let error = |sign: f64| Shared::from_fn(|row, _| if row == i { sign * step } else { 0.0 });
             let [above, below] = [1.0, -1.0].map(|sign| triangulated(&kernel, &pixels, separation, &error(sign)));
             let expected = (above - below) / (2.0 * step);
-            let found = uncertainty.by_shared.column(i);
             assert!((found - expected).norm() < 1e-4 * expected.norm().max(1e-3), "{kernel} {i}: {found} {expected}");
         }
     }
