@@ -6,7 +6,7 @@ use crate::common::count;
 const FAR: f64 = 9.0;
 /// By how much the NEES of the ranges of single places differ, as a standard deviation: places show more edges or fewer.
 const PLACES: f64 = 0.3;
-/// How far their mean over many places may be from one. Errors are stated for rooms of all kinds: in the corridor, which has few edges, the mean is 0.65,
+/// How far their mean over many places may be from one. Errors are stated for rooms of all kinds: in the corridor, which has few edges, the mean is 0.75,
 /// in the furnished room 1.2 (docs/measured/moving.md).
 const SCENES: f64 = 0.2;
 
