@@ -5,8 +5,10 @@ mod samples;
 
 use nalgebra::Vector3;
 use samples::*;
-use vergence_exchange::{ExchangeError, ForeignCamera, ForeignPair, ForeignRig, Format, Recognised};
-use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, OpenCvFisheye, Pixel, UnitRay};
+use vergence_exchange::{
+    Cameras, ExchangeError, ForeignCamera, ForeignPair, ForeignRig, Format, Recognised, WriteFormat, write,
+};
+use vergence_vision::{Angle, Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, UnitRay};
 
 const AHEAD: [f64; 3] = [0.3, -0.2, 0.9];
 const BEHIND: [f64; 3] = [-0.7, 0.4, -0.1];
@@ -287,4 +289,17 @@ fn damaged_files_are_refused_or_read_but_never_panic() {
         }
     }
     assert!(refused > 500, "{refused}");
+}
+
+/// A radius with more terms than the format has is written as the nearest with four, and how far that is off is said.
+#[test]
+fn further_radial_terms_are_written_as_the_nearest_lens_without() {
+    let drawn = equidistant(ImageSize { width: 2048, height: 2044 }, [1024.0, 1022.0]);
+    let lens = drawn.with_further_terms([1e-5, -1e-6]).expect("a lens");
+    let written = write(WriteFormat::Kalibr, &Cameras { left: lens, right: None }).expect("a file");
+    assert!(written.remarks.iter().any(|remark| remark.contains("terms beyond θ⁹")), "{:?}", written.remarks);
+    let read = read(Format::Kalibr, &written.files[0].text).cameras[0].lens().expect("a lens").lens;
+    assert!(!read.has_further_terms() && read != drawn);
+    let off = |other: &KannalaBrandt| lens.largest_difference(other, Length::from_mm(500.0));
+    assert!(off(&read) < 0.1 * off(&drawn), "{} and {} px", off(&read), off(&drawn));
 }
