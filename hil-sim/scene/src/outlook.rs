@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::packet::{Triples, next_value};
+use crate::packet::{Singles, next_value};
 
 /// Cells along the edge of a face of the cube.
 const CELLS: usize = 64;
@@ -76,6 +76,11 @@ impl Outlook {
         Self { place, slack, begins, candidates }
     }
 
+    /// Where it is from, in the world, mm.
+    pub const fn place(&self) -> Vector3<f64> {
+        self.place
+    }
+
     /// Whether rays from `origin` are of this outlook.
     #[inline]
     pub fn holds(&self, origin: &Vector3<f64>) -> bool {
@@ -84,7 +89,7 @@ impl Outlook {
 
     /// The numbers of the cells of `directions` of any length.
     #[inline(always)]
-    pub fn cells<const N: usize>(&self, directions: &Triples<N>) -> [usize; N] {
+    pub fn cells<const N: usize>(&self, directions: &Singles<N>) -> [usize; N] {
         let [x, y, z] = directions;
         let mut cells = [0; N];
         for i in 0..N {
@@ -99,11 +104,9 @@ impl Outlook {
                 (y[i], z[i], x[i], 1.0)
             };
             // Rounded by far less than the padding.
-            let scale = (0.5 * CELLS as f64) / along.abs();
-            let [column, row] = [first, second].map(|across| {
-                let at = (across * scale + 0.5 * CELLS as f64) as f32;
-                at.clamp(0.0, CELLS as f32 - 1.0).trunc()
-            });
+            let scale = (0.5 * CELLS as f32) / along.abs();
+            let [column, row] = [first, second]
+                .map(|across| (across * scale + 0.5 * CELLS as f32).clamp(0.0, CELLS as f32 - 1.0).trunc());
             let face = 2.0 * axis + if along < 0.0 { 1.0 } else { 0.0 };
             cells[i] = ((face * CELLS as f32 + row) * CELLS as f32 + column) as u32 as usize;
         }

@@ -10,6 +10,9 @@ pub const LANES: usize = 16;
 /// Three components of `N` vectors.
 pub type Triples<const N: usize> = [[f64; N]; 3];
 
+/// The same in single precision.
+pub type Singles<const N: usize> = [[f32; N]; 3];
+
 /// Rays in the world; those that do not count have any numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Packet<const N: usize> {
@@ -54,6 +57,18 @@ pub fn less<const N: usize>(vectors: &Triples<N>, middle: &Vector3<f64>) -> Trip
     less
 }
 
+/// Vectors rounded to single precision.
+#[inline(always)]
+pub fn singles<const N: usize>(vectors: &Triples<N>) -> Singles<N> {
+    let mut singles = [[0.0; N]; 3];
+    for axis in 0..3 {
+        for i in 0..N {
+            singles[axis][i] = vectors[axis][i] as f32;
+        }
+    }
+    singles
+}
+
 /// The places on rays at their `ranges`.
 #[inline(always)]
 pub fn at_ranges<const N: usize>(origin: &Triples<N>, direction: &Triples<N>, ranges: &[f64; N]) -> Triples<N> {
@@ -96,12 +111,12 @@ pub fn next_value<T: PartialEq + Copy, const N: usize>(
     Some((value, members))
 }
 
-/// The largest of the values of `members`; minus infinity where there are none.
+/// The largest of the values of `members`; `least` where there are none.
 #[inline(always)]
-pub fn largest<const N: usize>(values: &[f64; N], members: &[bool; N]) -> f64 {
-    let mut largest = [f64::NEG_INFINITY; N];
+pub fn largest<T: PartialOrd + Copy, const N: usize>(values: &[T; N], members: &[bool; N], least: T) -> T {
+    let mut largest = [least; N];
     for i in 0..N {
-        largest[i] = if members[i] { values[i] } else { f64::NEG_INFINITY };
+        largest[i] = if members[i] { values[i] } else { least };
     }
     // By halves: a vector instruction each.
     let mut half = N / 2;

@@ -12,10 +12,10 @@ use vergence_vision::{Angle, Camera, Transform, World};
 
 use crate::Optics;
 use crate::blur::spread;
-use crate::bundle::{Bundle, Found};
 use crate::lens::Lens;
 use crate::optics::encoded;
-use crate::rays::{PosedLens, RayGrid, directions_of_all};
+use crate::quick_bundle::QuickBundle;
+use crate::rays::{PosedLens, RayGrid};
 use crate::render::{Rows, View, lattice};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
@@ -23,6 +23,9 @@ use crate::trace::NOTHING;
 
 /// Further rays of a pixel at an edge between surfaces, and at one within a surface: those of prints are measured.
 const EDGE_RAYS: [u32; 2] = [6, 16];
+
+/// Number of rows that one task renders.
+const BAND: usize = 8;
 
 /// Difference of the square roots of the light of neighbours above which more rays are cast.
 const EDGE: f32 = 0.4;
@@ -94,64 +97,80 @@ pub fn render_quick(
 ) -> RgbImage {
     let (size, rows) = (view.camera.size(), Rows { at_once: 1, world_from_camera });
     let width = (size.width as usize).max(1);
-    let (outlook, lens_rays) = (rows.outlook(view), view.camera.rays());
-    let eye = |y: usize| PosedLens::new(view.camera, &lens_rays, &world_from_camera(y as u32));
+    let (place, slack) = rows.reach(view);
+    let (sight, lens_rays) = (view.scene.sight(place, slack), view.camera.rays());
+    let eyes = |top: usize, rows: usize| -> Vec<PosedLens<'_>> {
+        (top..top + rows).map(|y| PosedLens::new(view.camera, &lens_rays, &world_from_camera(y as u32))).collect()
+    };
 
     let mut glances = vec![Glance::default(); table.pixels.len()];
-    glances.par_chunks_mut(width).zip(table.pixels.par_chunks(width)).enumerate().for_each(|(y, (row, optics))| {
-        let eye = eye(y);
-        let grid = RayGrid::of_table(&eye, &table.rays, size.width);
-        let mut centres = Bundle::default();
-        for (x, optics) in optics.iter().enumerate() {
-            if let Some(around) = grid.around(x as u32, y as u32) {
-                centres.push(x, around.start(&around.centre()), around.centre(), f64::from(optics.pitch));
+    glances.par_chunks_mut(width * BAND).enumerate().for_each(|(band, glances)| {
+        let (top, rows) = (band * BAND, glances.len() / width);
+        let eyes = eyes(top, rows);
+        let mut centres = QuickBundle::default();
+        for [x, y] in tiled(width, rows) {
+            let (y_of_image, optics) = (top + y, &table.pixels[(top + y) * width + x]);
+            let grid = RayGrid::of_table(&eyes[y], &table.rays, size.width);
+            if let Some(around) = grid.around(x as u32, y_of_image as u32) {
+                centres.push(y * width + x, around.start(&around.centre()), around.centre(), optics.pitch);
             }
         }
         centres.follow(
             view.scene,
-            &outlook,
+            &sight,
             |_, _| true,
-            |x, Found { surface, light, .. }| {
-                row[x] = Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface };
+            |at, surface, light| {
+                glances[at] = Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface };
             },
         );
     });
 
     let mut image = vec![[0.0; 3]; glances.len()];
-    image.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        let eye = eye(y);
-        let grid = RayGrid::of_table(&eye, &table.rays, size.width);
-        let edges: Vec<Option<Edge>> = (0..width).map(|x| edge(&glances, width, x, y)).collect();
-        let (mut rays, mut counts) = (Bundle::default(), vec![1.0; width]);
-        for (x, (pixel, edge)) in row.iter_mut().zip(&edges).enumerate() {
-            let (at, optics) = (y * width + x, &table.pixels[y * width + x]);
-            if let Some((edge, around)) = edge.as_ref().zip(grid.around(x as u32, y as u32)) {
-                let nearby = around.nearby();
-                let places = EDGE_RAYS[usize::from(edge.within)];
-                // A ray outside the field brings no light.
-                for ray in lattice(places, mix64(seed ^ at as u64)).filter_map(|place| nearby.at(place)) {
-                    rays.push(x, around.start(&ray), ray, f64::from(optics.pitch));
-                }
-                counts[x] += places as f32;
+    image.par_chunks_mut(width * BAND).enumerate().for_each(|(band, pixels)| {
+        let (top, first) = (band * BAND, band * BAND * width);
+        let eyes = eyes(top, pixels.len() / width);
+        let edges: Vec<Option<Edge>> =
+            (0..pixels.len()).map(|at| edge(&glances, width, at % width, top + at / width)).collect();
+        let (mut rays, mut counts) = (QuickBundle::default(), vec![1.0; pixels.len()]);
+        for (at, (pixel, edge)) in pixels.iter_mut().zip(&edges).enumerate() {
+            *pixel = glances[first + at].light;
+            let Some(edge) = edge else { continue };
+            let grid = RayGrid::of_table(&eyes[at / width], &table.rays, size.width);
+            let Some(around) = grid.around((at % width) as u32, (top + at / width) as u32) else { continue };
+            let (nearby, pitch) = (around.nearby(), table.pixels[first + at].pitch);
+            let places = EDGE_RAYS[usize::from(edge.within)];
+            // A ray outside the field brings no light.
+            for ray in lattice(places, mix64(seed ^ (first + at) as u64)).filter_map(|place| nearby.at(place)) {
+                rays.push(at, around.start(&ray), ray, pitch);
             }
-            *pixel = glances[at].light;
+            counts[at] += places as f32;
         }
-        let light_of = |x: usize, surface: u32| edges[x].as_ref().and_then(|edge| edge.light_of(surface));
+        let light_of = |at: usize, surface: u32| edges[at].as_ref().and_then(|edge| edge.light_of(surface));
         rays.follow(
             view.scene,
-            &outlook,
-            |x, surface| light_of(x, surface).is_none(),
-            |x, found| {
-                let light = light_of(x, found.surface).unwrap_or(found.light);
-                row[x] = [0, 1, 2].map(|i| row[x][i] + light[i]);
+            &sight,
+            |at, surface| light_of(at, surface).is_none(),
+            |at, surface, light| {
+                let light = light_of(at, surface).unwrap_or(light);
+                pixels[at] = [0, 1, 2].map(|i| pixels[at][i] + light[i]);
             },
         );
-        for ((pixel, optics), count) in row.iter_mut().zip(&table.pixels[y * width..]).zip(counts) {
+        for ((pixel, optics), count) in pixels.iter_mut().zip(&table.pixels[first..]).zip(counts) {
             *pixel = pixel.map(|c| c * optics.exposure / count);
         }
     });
     let spots: Vec<f32> = table.pixels.iter().map(|pixel| pixel.spot).collect();
     develop(&spread(&image, width, view.optics.blur_px, &spots), &table.rays, view, !mix64(seed))
+}
+
+/// The places (x, y) of a band of so many columns and rows, square by square: what is side by side shows few surfaces.
+fn tiled(columns: usize, rows: usize) -> impl Iterator<Item = [usize; 2]> {
+    const SIDE: usize = 4;
+    let tops = (0..rows).step_by(SIDE).flat_map(move |top| (0..columns).step_by(SIDE).map(move |left| [left, top]));
+    tops.flat_map(move |[left, top]| {
+        let of_tile = move |y| (left..(left + SIDE).min(columns)).map(move |x| [x, y]);
+        (top..(top + SIDE).min(rows)).flat_map(of_tile)
+    })
 }
 
 /// A pixel, then those left, right, above and below of it, one of which shows something else; itself again in place of those beside the image.

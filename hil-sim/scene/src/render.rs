@@ -84,6 +84,12 @@ impl Rows<'_> {
 
     /// What the camera may see while it takes the image: from about the middle of its way.
     pub fn outlook(&self, view: &View<'_>) -> Outlook {
+        let (place, slack) = self.reach(view);
+        view.scene.outlook(place, slack)
+    }
+
+    /// A place, and how far from it (mm) rays start at most.
+    pub fn reach(&self, view: &View<'_>) -> (Vector3<f64>, f64) {
         const PUPILS: u32 = 32;
         const MARGIN_MM: f64 = 0.1;
         let height = view.camera.size().height;
@@ -95,7 +101,7 @@ impl Rows<'_> {
             view.camera.pupil(Angle::from_rad(theta))
         });
         let shift = pupils.map(|shift| shift.mm().abs()).fold(0.0, f64::max);
-        view.scene.outlook(place, moved[0].max(moved[1]) + shift + MARGIN_MM)
+        (place, moved[0].max(moved[1]) + shift + MARGIN_MM)
     }
 }
 

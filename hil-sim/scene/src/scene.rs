@@ -6,6 +6,7 @@ use crate::hierarchy::{Bounds, Hierarchy};
 use crate::light::{Lamp, Lighting};
 use crate::outlook::{Outlook, TurnedBox};
 use crate::shape::Shape;
+use crate::sight::Sight;
 use crate::texture::{Pattern, Rgb};
 
 /// The material of a surface.
@@ -36,7 +37,7 @@ pub struct Scene {
     pub(crate) hierarchy: Hierarchy,
     pub(crate) lighting: Lighting,
     /// What may shade places from each lamp.
-    pub(crate) shades: Vec<Outlook>,
+    pub(crate) shades: Vec<Sight>,
     /// The background between and beyond the solids.
     pub(crate) backdrop: Rgb,
 }
@@ -90,7 +91,8 @@ impl Scene {
     fn shaded(mut self) -> Self {
         let shades = |lamp: &Lamp| {
             let dark = self.solids.iter().enumerate().filter(|(_, solid)| solid.material.glow.is_none());
-            Outlook::new(dark.map(|(number, solid)| (number, solid.turned_box())), lamp.position, 0.0)
+            let outlook = Outlook::new(dark.map(|(number, solid)| (number, solid.turned_box())), lamp.position, 0.0);
+            Sight::new(&self.solids, outlook)
         };
         self.shades = self.lighting.lamps.iter().map(shades).collect();
         self

@@ -6,8 +6,11 @@ use vergence_vision::{Length, Point, UnitRay, World};
 
 use crate::Scene;
 use crate::outlook::Outlook;
-use crate::packet::{LANES, Packet, Triples, alone, at_ranges, dots, largest, less, next_value, one_of, turned};
+use crate::packet::{
+    LANES, Packet, Triples, alone, at_ranges, dots, largest, less, next_value, one_of, singles, turned,
+};
 use crate::scene::Solid;
+use crate::sight::Sight;
 use crate::texture::Rgb;
 
 /// In place of a surface's number where nothing is met.
@@ -60,6 +63,16 @@ pub fn light_many(
     scene.lights(rays, met, spreads)
 }
 
+/// [`Scene::glances`] of many rays, by the instructions of this machine: the same numbers on all.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
+pub fn glance_many(scene: &Scene, surface: u32, rays: &Packet<LANES>, spreads: &[f64; LANES]) -> [Rgb; LANES] {
+    scene.glances(surface, rays, spreads)
+}
+
+/// How carefully light is followed.
+const EXACT: u8 = 0;
+const QUICK: u8 = 1;
+
 impl Scene {
     /// Casts a ray from `origin`. `None` if it meets nothing, which inside a closed room does not happen.
     ///
@@ -110,11 +123,11 @@ impl Scene {
                 (0..3).for_each(|axis| first.normals[axis][i] = met.normals[axis][0]);
             }
         }
-        let cells = outlook.cells(&rays.direction);
+        let cells = outlook.cells(&singles(&rays.direction));
         // What stands in the cell of one ray alone, the others miss.
         let mut candidates = outlook.candidates(&inside.counts, &cells);
         while let Some(candidate) = candidates.next() {
-            if f64::from(candidate.from_mm) > largest(&first.ranges, &inside.counts) {
+            if f64::from(candidate.from_mm) > largest(&first.ranges, &inside.counts, f64::NEG_INFINITY) {
                 break;
             }
             self.solids[candidate.shape as usize].take(candidate.shape, &inside, &mut first);
@@ -131,7 +144,7 @@ impl Scene {
             *left &= *surface != NOTHING;
         }
         while let Some((surface, members)) = next_value(&mut left, &met.surfaces) {
-            let found = self.radiances(&self.solids[surface as usize], (rays, &members), met, spreads);
+            let found = self.radiances::<EXACT, N>(surface, (rays, &members), met, spreads);
             for i in 0..N {
                 lights[i] = if members[i] { found[i] } else { lights[i] };
             }
@@ -139,17 +152,37 @@ impl Scene {
         lights
     }
 
-    /// The linear colours where those of the rays that are `members` meet a solid.
+    /// The light along those of the rays that count, which meet this surface first by single precision.
     #[inline(always)]
-    fn radiances<const N: usize>(
+    fn glances<const N: usize>(&self, surface: u32, rays: &Packet<N>, spreads: &[f64; N]) -> [Rgb; N] {
+        let mut met = Encounters::NONE;
+        self.solids[surface as usize].take(surface, rays, &mut met);
+        let mut lights = self.radiances::<QUICK, N>(surface, (rays, &rays.counts), &met, spreads);
+        for i in (0..N).filter(|&i| rays.counts[i] && met.surfaces[i] == NOTHING) {
+            // Beside the surface by less than rounding: what is there.
+            let found = self.encounter(one_of(&rays.origin, i), one_of(&rays.direction, i));
+            lights[i] = found.map_or(self.backdrop, |(ray, met)| self.lights(&ray, &met, &[spreads[i]])[0]);
+        }
+        lights
+    }
+
+    /// What may be seen from within `slack` mm of `place`.
+    pub(crate) fn sight(&self, place: Vector3<f64>, slack: f64) -> Sight {
+        Sight::new(&self.solids, self.outlook(place, slack))
+    }
+
+    /// The linear colours where those of the rays that are `members` meet a surface.
+    #[inline(always)]
+    fn radiances<const PRECISION: u8, const N: usize>(
         &self,
-        solid: &Solid,
+        surface: u32,
         (rays, members): (&Packet<N>, &[bool; N]),
         met: &Encounters<N>,
         spreads: &[f64; N],
     ) -> [Rgb; N] {
         // Texture seen at a slant is compressed; more than this factor would blur it across as well.
         const MOST_SLANTED: f64 = 0.4;
+        let solid = &self.solids[surface as usize];
         let points = at_ranges(&rays.origin, &rays.direction, &met.ranges);
         let normals = turned(&solid.world_from_shape, &met.normals);
         let slants = dots(&normals, &rays.direction);
@@ -171,7 +204,10 @@ impl Scene {
                 lit[i] &= shares[i] > 0.0;
             }
             if lit.iter().any(|lit| *lit) {
-                let seen = self.seen(&points, &normals, (lamp.position, shades), &lit);
+                let seen = match PRECISION {
+                    EXACT => self.seen(&points, &normals, (lamp.position, shades.outlook()), &lit),
+                    _ => shades.reached(&points, surface, &lit),
+                };
                 for i in 0..N {
                     let more = [0, 1, 2].map(|channel| lights[i][channel] + lamp.power[channel] * shares[i]);
                     lights[i] = if seen[i] { more } else { lights[i] };
@@ -205,11 +241,11 @@ impl Scene {
         let distances = dots(&rays.direction, &rays.direction).map(f64::sqrt);
         let mut from_lamp = rays.direction;
         from_lamp.as_flattened_mut().iter_mut().for_each(|component| *component = -*component);
-        let cells = shades.cells(&from_lamp);
+        let cells = shades.cells(&singles(&from_lamp));
         let mut seen = *asked;
         let mut candidates = shades.candidates(asked, &cells);
         while let Some(candidate) = candidates.next() {
-            if f64::from(candidate.from_mm) > largest(&distances, &seen) {
+            if f64::from(candidate.from_mm) > largest(&distances, &seen, f64::NEG_INFINITY) {
                 break;
             }
             let solid = &self.solids[candidate.shape as usize];
