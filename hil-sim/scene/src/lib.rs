@@ -22,6 +22,7 @@ mod outlook;
 mod packet;
 mod quick;
 mod quick_bundle;
+mod quick_noise;
 mod range_map;
 mod rays;
 mod render;

@@ -7,6 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 /// Rays that are followed at once where many are: as many as the largest vector registers hold single precision numbers.
 pub const LANES: usize = 16;
 
+/// Light that is followed in double precision, with what that costs.
+pub const EXACT: u8 = 0;
+/// Light that is followed in single precision where this does not show.
+pub const QUICK: u8 = 1;
+
 /// Three components of `N` vectors.
 pub type Triples<const N: usize> = [[f64; N]; 3];
 

@@ -7,6 +7,7 @@
 use std::sync::LazyLock;
 
 use image::RgbImage;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use vergence_vision::{Angle, Camera, Transform, World};
 
@@ -15,7 +16,7 @@ use crate::blur::spread;
 use crate::lens::Lens;
 use crate::optics::encoded;
 use crate::quick_bundle::QuickBundle;
-use crate::rays::{PosedLens, RayGrid};
+use crate::rays::{Around, PosedLens, RayGrid};
 use crate::render::{Rows, View, lattice};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;
@@ -129,30 +130,30 @@ pub fn render_quick(
     image.par_chunks_mut(width * BAND).enumerate().for_each(|(band, pixels)| {
         let (top, first) = (band * BAND, band * BAND * width);
         let eyes = eyes(top, pixels.len() / width);
-        let edges: Vec<Option<Edge>> =
-            (0..pixels.len()).map(|at| edge(&glances, width, at % width, top + at / width)).collect();
-        let (mut rays, mut counts) = (QuickBundle::default(), vec![1.0; pixels.len()]);
-        for (at, (pixel, edge)) in pixels.iter_mut().zip(&edges).enumerate() {
+        let (mut rays, mut edges, mut counts) = (QuickBundle::default(), Vec::new(), vec![1.0; pixels.len()]);
+        for (at, pixel) in pixels.iter_mut().enumerate() {
+            let [x, y] = [at % width, at / width];
             *pixel = glances[first + at].light;
-            let Some(edge) = edge else { continue };
-            let grid = RayGrid::of_table(&eyes[at / width], &table.rays, size.width);
-            let Some(around) = grid.around((at % width) as u32, (top + at / width) as u32) else { continue };
-            let (nearby, pitch) = (around.nearby(), table.pixels[first + at].pitch);
+            let Some(edge) = edge(&glances, width, x, top + y) else { continue };
+            let grid = RayGrid::of_table(&eyes[y], &table.rays, size.width);
+            let Some(around) = grid.around(x as u32, (top + y) as u32) else { continue };
+            let pitch = table.pixels[first + at].pitch;
             let places = EDGE_RAYS[usize::from(edge.within)];
             // A ray outside the field brings no light.
-            for ray in lattice(places, mix64(seed ^ (first + at) as u64)).filter_map(|place| nearby.at(place)) {
-                rays.push(at, around.start(&ray), ray, pitch);
+            for ray in rays_of(&around, lattice(places, mix64(seed ^ (first + at) as u64))) {
+                rays.push(edges.len(), around.start(&ray), ray, pitch);
             }
             counts[at] += places as f32;
+            edges.push((at, edge));
         }
-        let light_of = |at: usize, surface: u32| edges[at].as_ref().and_then(|edge| edge.light_of(surface));
         rays.follow(
             view.scene,
             &sight,
-            |at, surface| light_of(at, surface).is_none(),
-            |at, surface, light| {
-                let light = light_of(at, surface).unwrap_or(light);
-                pixels[at] = [0, 1, 2].map(|i| pixels[at][i] + light[i]);
+            |edge, surface| edges[edge].1.light_of(&glances, surface).is_none(),
+            |edge, surface, light| {
+                let (at, edge) = &edges[edge];
+                let light = edge.light_of(&glances, surface).unwrap_or(light);
+                pixels[*at] = [0, 1, 2].map(|i| pixels[*at][i] + light[i]);
             },
         );
         for ((pixel, optics), count) in pixels.iter_mut().zip(&table.pixels[first..]).zip(counts) {
@@ -173,36 +174,51 @@ fn tiled(columns: usize, rows: usize) -> impl Iterator<Item = [usize; 2]> {
     })
 }
 
+/// The rays through these places on a pixel, in pixels from its centre. Between neighbours they are taken to change evenly, which is wrong by
+/// less than a thousandth of a pixel.
+fn rays_of(around: &Around<'_>, places: impl Iterator<Item = [f64; 2]>) -> impl Iterator<Item = Vector3<f64>> {
+    let (centre, slopes) = (around.centre(), around.slopes());
+    let nearby = slopes.is_none().then(|| around.nearby());
+    places.filter_map(move |place| match slopes {
+        Some([du, dv]) => Some(centre + du * place[0] + dv * place[1]),
+        None => nearby.as_ref()?.at(place),
+    })
+}
+
 /// A pixel, then those left, right, above and below of it, one of which shows something else; itself again in place of those beside the image.
 struct Edge {
-    glances: [Glance; 5],
+    pixels: [usize; 5],
     /// Whether the light differs much within one surface, which the rays then must see for themselves.
     within: bool,
 }
 
 impl Edge {
     /// The light of a surface that one of the pixels shows.
-    fn light_of(&self, surface: u32) -> Option<Rgb> {
-        let shown = self.glances.iter().find(|glance| glance.surface == surface)?;
-        (!self.within).then_some(shown.light)
+    fn light_of(&self, glances: &[Glance], surface: u32) -> Option<Rgb> {
+        let mut shown = self.pixels.iter().map(|pixel| &glances[*pixel]);
+        shown.find(|glance| glance.surface == surface && !self.within).map(|glance| glance.light)
     }
 }
 
 /// The edge at a pixel, if it shows something else than one beside, above or below it.
 fn edge(glances: &[Glance], width: usize, x: usize, y: usize) -> Option<Edge> {
     let at = y * width + x;
-    let here = glances[at];
-    let beside = |is_there: bool, at: usize| if is_there { glances[at] } else { here };
-    let glances = [
-        here,
+    let beside = |is_there: bool, other: usize| if is_there { other } else { at };
+    let pixels = [
+        at,
         beside(x > 0, at.saturating_sub(1)),
         beside(x + 1 < width, at + 1),
         beside(y > 0, at.saturating_sub(width)),
         beside(at + width < glances.len(), at + width),
     ];
-    let within = glances.iter().any(|other| other.surface == here.surface && (other.level - here.level).abs() > EDGE);
-    let differs = within || glances.iter().any(|other| other.surface != here.surface);
-    differs.then_some(Edge { glances, within })
+    let here = &glances[at];
+    let (mut within, mut differs) = (false, false);
+    for other in pixels.map(|pixel| &glances[pixel]) {
+        let is_same = other.surface == here.surface;
+        within |= is_same & ((other.level - here.level).abs() > EDGE);
+        differs |= !is_same;
+    }
+    (within | differs).then_some(Edge { pixels, within })
 }
 
 /// The grey level of light, 0 to 1, before noise, at steps of its square root.

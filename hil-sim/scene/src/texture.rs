@@ -4,9 +4,10 @@
 //! nowhere else. Features finer than the footprint of a pixel fade to their mean.
 
 use crate::Sheet;
-use crate::packet::Triples;
+use crate::packet::{EXACT, Triples, singles};
+use crate::quick_noise;
 use crate::shape::SurfacePoints;
-use crate::texture_noise::{cell_hash, fraction, octaves, smoothstep, split, survival};
+use crate::texture_noise::{self, cell_hash, fraction, smoothstep, split, survival};
 
 /// Linear red, green and blue.
 pub type Rgb = [f32; 3];
@@ -39,35 +40,51 @@ pub enum Pattern {
 impl Pattern {
     /// The reflectance of the variant `seed` at the places `at` that are `wanted`.
     #[inline(always)]
-    pub fn reflectances<const N: usize>(&self, at: &SurfacePoints<N>, seed: u32, wanted: &[bool; N]) -> [Rgb; N] {
+    pub fn reflectances<const PRECISION: u8, const N: usize>(
+        &self,
+        at: &SurfacePoints<N>,
+        seed: u32,
+        wanted: &[bool; N],
+    ) -> [Rgb; N] {
         let seeds = at.face.map(|face| seed.wrapping_add(face.wrapping_mul(0x51ed_270b)));
         match *self {
             Self::Mottled { light, dark, cell } => {
-                noise(at, &seeds, cell, 6).map(|clouds| blend(dark, light, 0.5 + 0.42 * clouds))
+                noise::<PRECISION, N>(at, &seeds, cell, 6).map(|clouds| blend(dark, light, 0.5 + 0.42 * clouds))
             }
             Self::Wood { light, dark, axis } => {
-                grain(&at.position, axis, &seeds, &at.footprint).map(|tone| blend(dark, light, tone))
+                grain::<PRECISION, N>(&at.position, axis, &seeds, &at.footprint).map(|tone| blend(dark, light, tone))
             }
-            Self::Planks { light, dark, width, length } => planks(at, light, dark, [width, length], &seeds),
+            Self::Planks { light, dark, width, length } => {
+                planks::<PRECISION, N>(at, light, dark, [width, length], &seeds)
+            }
             Self::Bricks { light, dark } => {
-                let (ragged, clouds) = (noise(at, &salted(&seeds, 0x3c), 40.0, 2), noise(at, &seeds, 64.0, 5));
+                let (ragged, clouds) = (
+                    noise::<PRECISION, N>(at, &salted(&seeds, 0x3c), 40.0, 2),
+                    noise::<PRECISION, N>(at, &seeds, 64.0, 5),
+                );
                 each(at, &seeds, wanted, |i, spot| bricks(spot, light, dark, [ragged[i], clouds[i]]))
             }
             Self::Woven { warp, weft, thread } => {
-                let (motif, wear) = (noise(at, &salted(&seeds, 0x19), 170.0, 3), noise(at, &seeds, 45.0, 4));
+                let (motif, wear) = (
+                    noise::<PRECISION, N>(at, &salted(&seeds, 0x19), 170.0, 3),
+                    noise::<PRECISION, N>(at, &seeds, 45.0, 4),
+                );
                 each(at, &seeds, wanted, |i, spot| woven(spot, warp, weft, thread, [motif[i], wear[i]]))
             }
             Self::Blots { ground, cell } => {
-                let wash = noise(at, &seeds, 2.0 * cell, 6);
+                let wash = noise::<PRECISION, N>(at, &seeds, 2.0 * cell, 6);
                 each(at, &seeds, wanted, |i, spot| blots(spot, ground, cell, wash[i]))
             }
             Self::Book { cloth, ink } => {
-                let linen = noise(at, &seeds, 30.0, 3);
+                let linen = noise::<PRECISION, N>(at, &seeds, 30.0, 3);
                 each(at, &seeds, wanted, |i, spot| book(spot, cloth, ink, linen[i]))
             }
-            Self::Leaf { light, dark } => leaf(at, light, dark, &seeds),
+            Self::Leaf { light, dark } => leaf::<PRECISION, N>(at, light, dark, &seeds),
             Self::Garden { height } => {
-                let (foliage, clouds) = (noise(at, &seeds, 220.0, 6), noise(at, &salted(&seeds, 0x5a), 300.0, 4));
+                let (foliage, clouds) = (
+                    noise::<PRECISION, N>(at, &seeds, 220.0, 6),
+                    noise::<PRECISION, N>(at, &salted(&seeds, 0x5a), 300.0, 4),
+                );
                 each(at, &seeds, wanted, |i, spot| garden(spot, height, [foliage[i], clouds[i]]))
             }
             Self::Print(sheet) => each(at, &seeds, wanted, |_, spot| sheet.ink(spot.uv, spot.face == 1)),
@@ -77,8 +94,27 @@ impl Pattern {
 
 /// Noise at points on a surface.
 #[inline(always)]
-fn noise<const N: usize>(at: &SurfacePoints<N>, seeds: &[u32; N], cell: f64, count: u32) -> [f32; N] {
-    octaves(&at.position, cell, count, seeds, &at.footprint)
+fn noise<const PRECISION: u8, const N: usize>(
+    at: &SurfacePoints<N>,
+    seeds: &[u32; N],
+    cell: f64,
+    count: u32,
+) -> [f32; N] {
+    octaves::<PRECISION, N>(&at.position, cell, count, seeds, &at.footprint)
+}
+
+#[inline(always)]
+fn octaves<const PRECISION: u8, const N: usize>(
+    position: &Triples<N>,
+    cell: f64,
+    count: u32,
+    seeds: &[u32; N],
+    footprint: &[f64; N],
+) -> [f32; N] {
+    match PRECISION {
+        EXACT => texture_noise::octaves(position, cell, count, seeds, footprint),
+        _ => quick_noise::octaves(&singles(position), cell, count, seeds, footprint),
+    }
 }
 
 /// Seeds of another noise at the same points.
@@ -144,11 +180,16 @@ pub fn pigment(hash: u32) -> Rgb {
 
 /// Streaks stretched eightfold along `axis`, and pores that are not; 0 dark to 1 light.
 #[inline(always)]
-fn grain<const N: usize>(position: &Triples<N>, axis: usize, seeds: &[u32; N], footprint: &[f64; N]) -> [f32; N] {
+fn grain<const PRECISION: u8, const N: usize>(
+    position: &Triples<N>,
+    axis: usize,
+    seeds: &[u32; N],
+    footprint: &[f64; N],
+) -> [f32; N] {
     let mut stretched = *position;
     stretched[axis].iter_mut().for_each(|component| *component *= 0.125);
-    let streaks = octaves(&stretched, 48.0, 4, seeds, footprint);
-    let clouds = octaves(position, 60.0, 4, &salted(seeds, 0x77), footprint);
+    let streaks = octaves::<PRECISION, N>(&stretched, 48.0, 4, seeds, footprint);
+    let clouds = octaves::<PRECISION, N>(position, 60.0, 4, &salted(seeds, 0x77), footprint);
     let mut tones = [0.0; N];
     for i in 0..N {
         tones[i] = 0.5 + 0.34 * streaks[i] + 0.24 * clouds[i];
@@ -165,7 +206,7 @@ fn joint(offset: f32, size: f64, joint: f64, footprint: f64) -> f32 {
 }
 
 #[inline(always)]
-fn planks<const N: usize>(
+fn planks<const PRECISION: u8, const N: usize>(
     at: &SurfacePoints<N>,
     light: Rgb,
     dark: Rgb,
@@ -179,7 +220,7 @@ fn planks<const N: usize>(
         let (piece, along) = split(at.uv[1][i] / length + shift);
         (cell_hash(plank, piece, seeds[i]), across, along)
     });
-    let grains = grain(&at.position, 1, &places.map(|(hash, ..)| hash), &at.footprint);
+    let grains = grain::<PRECISION, N>(&at.position, 1, &places.map(|(hash, ..)| hash), &at.footprint);
     std::array::from_fn(|i| {
         let (hash, across, along) = places[i];
         let tone = 0.35 * (fraction(hash, 2) - 0.5) + grains[i];
@@ -286,12 +327,17 @@ fn book(at: &Spot, cloth: Rgb, ink: Rgb, linen: f32) -> Rgb {
 }
 
 #[inline(always)]
-fn leaf<const N: usize>(at: &SurfacePoints<N>, light: Rgb, dark: Rgb, seeds: &[u32; N]) -> [Rgb; N] {
+fn leaf<const PRECISION: u8, const N: usize>(
+    at: &SurfacePoints<N>,
+    light: Rgb,
+    dark: Rgb,
+    seeds: &[u32; N],
+) -> [Rgb; N] {
     let [from_rib, along] = at.uv;
     let mut slanted = along;
     slanted.iter_mut().zip(&from_rib).for_each(|(slanted, from_rib)| *slanted -= from_rib.abs());
     let across = [from_rib, slanted, [0.0; N]];
-    let veins = octaves(&across, 26.0, 4, seeds, &at.footprint);
+    let veins = octaves::<PRECISION, N>(&across, 26.0, 4, seeds, &at.footprint);
     std::array::from_fn(|i| {
         let rib = smoothstep(5.0, 2.0, at.uv[0][i].abs() as f32) * survival(6.0, at.footprint[i]);
         blend(dark, light, 0.5 + 0.5 * veins[i] + 0.6 * rib)

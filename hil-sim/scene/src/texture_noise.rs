@@ -3,7 +3,7 @@
 use crate::packet::Triples;
 
 /// Ratio of the amplitudes of an octave and the next coarser one.
-const PERSISTENCE: f32 = 0.72;
+pub const PERSISTENCE: f32 = 0.72;
 
 /// Mixes 32 bits so that each output bit depends on all input bits (the finaliser of MurmurHash3, A. Appleby 2011).
 pub fn mix(mut h: u32) -> u32 {
@@ -63,9 +63,18 @@ pub fn value_noise<const N: usize>(p: &Triples<N>, seeds: &[u32; N]) -> [f32; N]
     for axis in 0..3 {
         for i in 0..N {
             let (cell, share) = split(p[axis][i]);
-            cells[axis][i] = cell.cast_unsigned().wrapping_mul(STRANDS[axis]);
-            shares[axis][i] = share;
+            (cells[axis][i], shares[axis][i]) = (cell.cast_unsigned(), share);
         }
+    }
+    blended(&cells, &shares, seeds)
+}
+
+/// The noise at places in cells of a unit, by their shares of the way across them.
+#[inline(always)]
+pub fn blended<const N: usize>(cells: &[[u32; N]; 3], shares: &[[f32; N]; 3], seeds: &[u32; N]) -> [f32; N] {
+    let mut cells = *cells;
+    for (cells, strand) in cells.iter_mut().zip(STRANDS) {
+        cells.iter_mut().for_each(|cell| *cell = cell.wrapping_mul(strand));
     }
     let mut noise = [0.0; N];
     for i in 0..N {

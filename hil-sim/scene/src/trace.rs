@@ -7,7 +7,7 @@ use vergence_vision::{Length, Point, UnitRay, World};
 use crate::Scene;
 use crate::outlook::Outlook;
 use crate::packet::{
-    LANES, Packet, Triples, alone, at_ranges, dots, largest, less, next_value, one_of, singles, turned,
+    EXACT, LANES, Packet, QUICK, Triples, alone, at_ranges, dots, largest, less, next_value, one_of, singles, turned,
 };
 use crate::scene::Solid;
 use crate::sight::Sight;
@@ -68,10 +68,6 @@ pub fn light_many(
 pub fn glance_many(scene: &Scene, surface: u32, rays: &Packet<LANES>, spreads: &[f64; LANES]) -> [Rgb; LANES] {
     scene.glances(surface, rays, spreads)
 }
-
-/// How carefully light is followed.
-const EXACT: u8 = 0;
-const QUICK: u8 = 1;
 
 impl Scene {
     /// Casts a ray from `origin`. `None` if it meets nothing, which inside a closed room does not happen.
@@ -192,7 +188,7 @@ impl Scene {
         }
         let positions = turned(&solid.shape_from_world, &less(&points, &solid.centre));
         let at = solid.shape.surface_points(positions, &met.normals, footprints);
-        let reflectances = solid.material.pattern.reflectances(&at, solid.material.seed, members);
+        let reflectances = solid.material.pattern.reflectances::<PRECISION, N>(&at, solid.material.seed, members);
         if let Some(glow) = solid.material.glow {
             return reflectances.map(|reflectance| reflectance.map(|c| c * glow));
         }
