@@ -23,6 +23,7 @@ mod packet;
 mod quick;
 mod quick_bundle;
 mod quick_noise;
+mod quick_sensor;
 mod range_map;
 mod rays;
 mod render;

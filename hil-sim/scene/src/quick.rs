@@ -4,8 +4,6 @@
 //! ray or a neighbour's meets something else, or another light. A ray that meets what a neighbour shows takes the neighbour's light. What depends on lens and pixel alone is computed once, in a [`RayTable`].
 //! Nothing is displaced from where [`render`](crate::render) shows it: places on a pixel's square are symmetric about its centre.
 
-use std::sync::LazyLock;
-
 use image::RgbImage;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -14,8 +12,8 @@ use vergence_vision::{Angle, Camera, Transform, World};
 use crate::Optics;
 use crate::blur::spread;
 use crate::lens::Lens;
-use crate::optics::encoded;
 use crate::quick_bundle::QuickBundle;
+use crate::quick_sensor::develop;
 use crate::rays::{Around, PosedLens, RayGrid};
 use crate::render::{Rows, View, lattice};
 use crate::texture::Rgb;
@@ -219,46 +217,4 @@ fn edge(glances: &[Glance], width: usize, x: usize, y: usize) -> Option<Edge> {
         differs |= !is_same;
     }
     (within | differs).then_some(Edge { pixels, within })
-}
-
-/// The grey level of light, 0 to 1, before noise, at steps of its square root.
-static LEVELS: LazyLock<Vec<f32>> = LazyLock::new(|| {
-    (0..=LEVEL_STEPS).map(|step| (255.0 * encoded((step as f64 / LEVEL_STEPS as f64).powi(2))) as f32).collect()
-});
-const LEVEL_STEPS: usize = 4096;
-
-/// The image that the sensor makes of light; black outside the field.
-fn develop(light: &[Rgb], rays: &[[f64; 3]], view: &View<'_>, noise: u64) -> RgbImage {
-    let (size, optics) = (view.camera.size(), view.optics);
-    let width = (size.width as usize).max(1);
-    let [read, shot, gain] = [optics.read_noise, optics.shot_noise, optics.gain].map(|value| value.max(0.0) as f32);
-    let levels: &[f32] = &LEVELS;
-    let mut image = RgbImage::new(size.width, size.height);
-    image.par_chunks_exact_mut(3 * width).zip(light.par_chunks(width)).enumerate().for_each(|(y, (row, light))| {
-        let in_field = &rays[(y + 1) * (width + 2) + 1..];
-        for (x, (pixel, light)) in
-            row.chunks_exact_mut(3).zip(light).enumerate().filter(|(x, _)| !in_field[*x][2].is_nan())
-        {
-            let mut hash = mix64(noise ^ (y * width + x) as u64);
-            for (byte, light) in pixel.iter_mut().zip(light) {
-                hash = mix64(hash);
-                let root = (gain * light).clamp(0.0, 1.0).sqrt();
-                let level = levels[(root * LEVEL_STEPS as f32 + 0.5) as usize];
-                let sigma = (read * read + shot * shot * level * (1.0 / 255.0)).sqrt();
-                // Adding a half and cutting rounds; below 0 it is 0.
-                *byte = (level + sigma * normal(hash) + 0.5) as u8;
-            }
-        }
-    });
-    image
-}
-
-/// A number of mean 0 and variance 1 from a hash: how many of its bits are set, with a uniform number between two such counts. Its excess
-/// kurtosis is -1/32.
-fn normal(hash: u64) -> f32 {
-    const BITS_MEAN: f32 = 32.0;
-    // The variance of 64 fair bits, and that of the uniform number.
-    const VARIANCE: f32 = 16.0 + 1.0 / 12.0;
-    let between = (mix64(!hash) >> 40) as f32 / 16_777_216.0 - 0.5;
-    (hash.count_ones() as f32 - BITS_MEAN + between) / VARIANCE.sqrt()
 }

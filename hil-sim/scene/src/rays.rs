@@ -55,6 +55,7 @@ impl<'a> PosedLens<'a> {
     }
 
     /// Where light from a direction of the world crosses the axis: the camera's origin, or the pupil of that angle.
+    #[inline]
     pub fn start(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         if self.is_central {
             return self.origin;
@@ -69,6 +70,7 @@ impl<'a> PosedLens<'a> {
         self.in_world(self.rays.directions(&[[pixel.u, pixel.v]]).first()?)
     }
 
+    #[inline]
     fn in_world(&self, ray: &[f64; 3]) -> Option<Vector3<f64>> {
         (!ray[2].is_nan()).then(|| self.world_from_camera * Vector3::from(*ray))
     }
@@ -88,7 +90,8 @@ impl<'a> RayGrid<'a> {
         Self { posed, stride: columns as usize + 2, rays }
     }
 
-    /// The ray of a pixel; `None` outside the field.
+    /// The ray of a pixel of the rectangle; `None` outside the field.
+    #[inline]
     pub fn around(&'a self, x: u32, y: u32) -> Option<Around<'a>> {
         let middle = (y as usize + 1) * self.stride + x as usize + 1;
         let centre = self.posed.in_world(&self.rays[middle])?;
@@ -103,11 +106,13 @@ impl<'a> Around<'a> {
     }
 
     /// Where light from a direction of the world crosses the axis of the lens, in the world.
+    #[inline]
     pub fn start(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.grid.posed.start(direction)
     }
 
     /// How the ray changes per pixel along u and v, by its neighbours'; `None` at the edge of the field.
+    #[inline]
     pub fn slopes(&self) -> Option<[Vector3<f64>; 2]> {
         let (rays, stride) = (&self.grid.rays, self.grid.stride);
         let slope = |before: usize, after: usize| {

@@ -15,6 +15,7 @@ pub fn mix(mut h: u32) -> u32 {
 }
 
 /// Mixes 64 bits (SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014).
+#[inline(always)]
 pub fn mix64(mut h: u64) -> u64 {
     h = h.wrapping_add(0x9e37_79b9_7f4a_7c15);
     h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
