@@ -43,6 +43,8 @@ pub struct Candidate {
 pub struct Outlook {
     place: Vector3<f64>,
     slack: f64,
+    /// How many cells further to the right and down the shapes of a cell's list stand.
+    overlap: usize,
     /// Where the candidates of a cell begin; those of the next one are their end.
     begins: Vec<u32>,
     candidates: Vec<Candidate>,
@@ -51,6 +53,17 @@ pub struct Outlook {
 impl Outlook {
     /// From `place`, for all rays that start within `slack` mm of it.
     pub fn new(shapes: impl Iterator<Item = (usize, TurnedBox)>, place: Vector3<f64>, slack: f64) -> Self {
+        Self::overlapping(shapes, place, slack, 0)
+    }
+
+    /// The same for rays that keep together: the list of a cell is also of those right of it and below it within `overlap` cells, so that one
+    /// list serves all.
+    pub fn overlapping(
+        shapes: impl Iterator<Item = (usize, TurnedBox)>,
+        place: Vector3<f64>,
+        slack: f64,
+        overlap: usize,
+    ) -> Self {
         let mut shapes: Vec<(Candidate, TurnedBox)> = shapes
             .map(|(shape, mut of_shape)| {
                 of_shape.half.add_scalar_mut(slack + PADDING_MM);
@@ -60,7 +73,7 @@ impl Outlook {
             .collect();
         shapes.sort_by(|a, b| a.0.order(&b.0));
         let listed: Vec<(Candidate, [Option<Part>; FACES])> =
-            shapes.into_iter().map(|(candidate, of_shape)| (candidate, of_shape.parts(place))).collect();
+            shapes.into_iter().map(|(candidate, of_shape)| (candidate, of_shape.parts(place, overlap))).collect();
         let mut begins = vec![0; FACES * CELLS * CELLS + 1];
         for_each_cell(&listed, |cell, _| begins[cell + 1] += 1);
         for cell in 1..begins.len() {
@@ -73,7 +86,7 @@ impl Outlook {
             candidates[next[cell] as usize] = candidate;
             next[cell] += 1;
         });
-        Self { place, slack, begins, candidates }
+        Self { place, slack, overlap, begins, candidates }
     }
 
     /// Where it is from, in the world, mm.
@@ -117,11 +130,37 @@ impl Outlook {
     #[inline(always)]
     pub fn candidates<const N: usize>(&self, counts: &[bool; N], cells: &[usize; N]) -> Candidates<'_, N> {
         let (mut left, mut lists, mut count) = (*counts, [[].as_slice(); N], 0);
+        if let Some(cell) = self.cell_of_all(counts, cells) {
+            (lists[0], count, left) = (self.list(cell), 1, [false; N]);
+        }
         while let Some((cell, _)) = next_value(&mut left, cells) {
-            lists[count] = &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize];
+            lists[count] = self.list(cell);
             count += 1;
         }
         Candidates { lists, count }
+    }
+
+    #[inline(always)]
+    fn list(&self, cell: usize) -> &[Candidate] {
+        &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize]
+    }
+
+    /// The cell whose list holds the shapes of all these cells, if they are near enough to each other on one face.
+    #[inline(always)]
+    fn cell_of_all<const N: usize>(&self, counts: &[bool; N], cells: &[usize; N]) -> Option<usize> {
+        let (mut first, mut last) = ([u32::MAX; 2], [0; 2]);
+        for i in 0..N {
+            // Rows are counted over all faces.
+            let place = [cells[i] as u32 % CELLS as u32, cells[i] as u32 / CELLS as u32];
+            for axis in 0..2 {
+                let (low, high) = if counts[i] { (place[axis], place[axis]) } else { (u32::MAX, 0) };
+                first[axis] = first[axis].min(low);
+                last[axis] = last[axis].max(high);
+            }
+        }
+        let is_near = |axis: usize| first[axis] <= last[axis] && last[axis] - first[axis] <= self.overlap as u32;
+        let is_one_face = first[1] / CELLS as u32 == last[1] / CELLS as u32;
+        (is_near(0) && is_near(1) && is_one_face).then_some(first[1] as usize * CELLS + first[0] as usize)
     }
 }
 
@@ -176,7 +215,7 @@ impl TurnedBox {
     }
 
     /// The cells of each face of the cube about `place` that the box covers: those of the rectangle about its corners' projections.
-    fn parts(&self, place: Vector3<f64>) -> [Option<Part>; FACES] {
+    fn parts(&self, place: Vector3<f64>, overlap: usize) -> [Option<Part>; FACES] {
         if self.distance(place) < 2.0 * NEAR_MM {
             return [Some([[0, CELLS - 1]; 2]); FACES];
         }
@@ -184,7 +223,11 @@ impl TurnedBox {
             let sign = Vector3::from_fn(|axis, _| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 });
             self.centre - place + self.world_from_box * self.half.component_mul(&sign)
         });
-        std::array::from_fn(|face| part(&corners, face / 2, if face % 2 == 0 { 1.0 } else { -1.0 }))
+        let mut parts = std::array::from_fn(|face| part(&corners, face / 2, if face % 2 == 0 { 1.0 } else { -1.0 }));
+        for [first, _] in parts.iter_mut().flatten().flatten() {
+            *first = first.saturating_sub(overlap);
+        }
+        parts
     }
 }
 

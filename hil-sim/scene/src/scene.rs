@@ -37,7 +37,9 @@ pub struct Scene {
     pub(crate) hierarchy: Hierarchy,
     pub(crate) lighting: Lighting,
     /// What may shade places from each lamp.
-    pub(crate) shades: Vec<Sight>,
+    pub(crate) shades: Vec<Outlook>,
+    /// The same for many places on one surface.
+    pub(crate) quick_shades: Vec<Sight>,
     /// The background between and beyond the solids.
     pub(crate) backdrop: Rgb,
 }
@@ -70,7 +72,14 @@ impl Scene {
     pub(crate) fn empty(backdrop: Rgb) -> Self {
         let room = [Vector3::repeat(f64::NEG_INFINITY), Vector3::repeat(f64::INFINITY)];
         let lighting = Lighting { ambient: [1.0; 3], from_above: 0.0, occlusion: 0.0, room, lamps: Vec::new() };
-        Self { solids: Vec::new(), hierarchy: Hierarchy::default(), lighting, shades: Vec::new(), backdrop }
+        Self {
+            solids: Vec::new(),
+            hierarchy: Hierarchy::default(),
+            lighting,
+            shades: Vec::new(),
+            quick_shades: Vec::new(),
+            backdrop,
+        }
     }
 
     /// The scene with more solids.
@@ -89,12 +98,15 @@ impl Scene {
 
     /// The scene with its shades as of its solids and lamps.
     fn shaded(mut self) -> Self {
-        let shades = |lamp: &Lamp| {
+        let dark = || {
             let dark = self.solids.iter().enumerate().filter(|(_, solid)| solid.material.glow.is_none());
-            let outlook = Outlook::new(dark.map(|(number, solid)| (number, solid.turned_box())), lamp.position, 0.0);
-            Sight::new(&self.solids, outlook)
+            dark.map(|(number, solid)| (number, solid.turned_box()))
         };
-        self.shades = self.lighting.lamps.iter().map(shades).collect();
+        let lamps = &self.lighting.lamps;
+        self.shades = lamps.iter().map(|lamp| Outlook::new(dark(), lamp.position, 0.0)).collect();
+        let quick =
+            |lamp: &Lamp| Sight::new(&self.solids, Outlook::overlapping(dark(), lamp.position, 0.0, Sight::OVERLAP));
+        self.quick_shades = lamps.iter().map(quick).collect();
         self
     }
 }

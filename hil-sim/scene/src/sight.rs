@@ -18,15 +18,13 @@ pub struct Sight {
 }
 
 impl Sight {
+    /// Cells of the outlook over which rays that are followed together are spread: of neighbouring pixels seldom more.
+    pub const OVERLAP: usize = 1;
+
     /// Of these of all `solids` that `outlook` shows, about its place.
     pub fn new(solids: &[Solid], outlook: Outlook) -> Self {
         let place = outlook.place();
         Self { place, solids: solids.iter().map(|solid| SolidFrom::new(solid, &place)).collect(), outlook }
-    }
-
-    /// What may be met from the place.
-    pub const fn outlook(&self) -> &Outlook {
-        &self.outlook
     }
 
     /// `points` in the world less the place.

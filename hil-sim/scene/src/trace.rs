@@ -164,7 +164,8 @@ impl Scene {
 
     /// What may be seen from within `slack` mm of `place`.
     pub(crate) fn sight(&self, place: Vector3<f64>, slack: f64) -> Sight {
-        Sight::new(&self.solids, self.outlook(place, slack))
+        let boxes = self.solids.iter().map(Solid::turned_box).enumerate();
+        Sight::new(&self.solids, Outlook::overlapping(boxes, place, slack, Sight::OVERLAP))
     }
 
     /// The linear colours where those of the rays that are `members` meet a surface.
@@ -193,7 +194,7 @@ impl Scene {
             return reflectances.map(|reflectance| reflectance.map(|c| c * glow));
         }
         let mut lights = self.lighting.ambients(&points, &normals);
-        for (lamp, shades) in self.lighting.lamps.iter().zip(&self.shades) {
+        for (number, lamp) in self.lighting.lamps.iter().enumerate() {
             let shares = lamp.shares(&points, &normals);
             let mut lit = *members;
             for i in 0..N {
@@ -201,8 +202,8 @@ impl Scene {
             }
             if lit.iter().any(|lit| *lit) {
                 let seen = match PRECISION {
-                    EXACT => self.seen(&points, &normals, (lamp.position, shades.outlook()), &lit),
-                    _ => shades.reached(&points, surface, &lit),
+                    EXACT => self.seen(&points, &normals, (lamp.position, &self.shades[number]), &lit),
+                    _ => self.quick_shades[number].reached(&points, surface, &lit),
                 };
                 for i in 0..N {
                     let more = [0, 1, 2].map(|channel| lights[i][channel] + lamp.power[channel] * shares[i]);
