@@ -48,8 +48,8 @@ pub fn develop(light: &[Rgb], rays: &[[f64; 3]], view: &View<'_>, noise: u64) ->
 fn exposed(lights: &[Rgb; LANES], sensor: Sensor, levels: &[f32], noise: u64, first: u64) -> [[u8; LANES]; 3] {
     let [read, shot, gain] = sensor;
     let (mut bytes, mut hashes) = ([[0; LANES]; 3], [0; LANES]);
-    for i in 0..LANES {
-        hashes[i] = mix64(noise ^ (first + i as u64));
+    for (hash, number) in hashes.iter_mut().zip(first..) {
+        *hash = mix64(noise ^ number);
     }
     for (channel, bytes) in bytes.iter_mut().enumerate() {
         let (mut steps, mut shown, mut normals) = ([0_u32; LANES], [0.0; LANES], [0.0; LANES]);

@@ -29,7 +29,7 @@ impl Sight {
 
     /// `points` in the world less the place.
     #[inline(always)]
-    fn from_place<const N: usize>(&self, points: &Triples<N>) -> Singles<N> {
+    fn offsets<const N: usize>(&self, points: &Triples<N>) -> Singles<N> {
         let mut offsets = [[0.0; N]; 3];
         for axis in 0..3 {
             for i in 0..N {
@@ -42,7 +42,7 @@ impl Sight {
     /// The first surfaces on rays of unit length, and [`NOTHING`] where there is none or the ray does not count.
     #[inline(always)]
     fn first<const N: usize>(&self, origins: &Triples<N>, directions: &Triples<N>, counts: &[bool; N]) -> [u32; N] {
-        let (offsets, singles) = (self.from_place(origins), singles(directions));
+        let (offsets, singles) = (self.offsets(origins), singles(directions));
         let (mut surfaces, mut ranges) = ([NOTHING; N], [f32::INFINITY; N]);
         let cells = self.outlook.cells(&singles);
         let mut candidates = self.outlook.candidates(counts, &cells);
@@ -66,7 +66,7 @@ impl Sight {
     pub fn reached<const N: usize>(&self, points: &Triples<N>, own: u32, asked: &[bool; N]) -> [bool; N] {
         // So near its end, as a share of its length, a ray has met the surface that it is to reach.
         const END: f32 = 1.0 - 2e-5;
-        let directions = self.from_place(points);
+        let directions = self.offsets(points);
         let mut distances = [0.0; N];
         for i in 0..N {
             let [x, y, z] = [directions[0][i], directions[1][i], directions[2][i]];
@@ -101,4 +101,42 @@ pub fn first_many(
     counts: &[bool; LANES],
 ) -> [u32; LANES] {
     sight.first(origins, directions, counts)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+    use crate::Scene;
+    use crate::packet::{Packet, alone};
+    use crate::trace::meet_many;
+
+    #[test]
+    fn single_precision_finds_the_surfaces_that_double_precision_does() {
+        let room = Scene::room();
+        let place = Vector3::new(-60.0, 20.0, 10.0);
+        let (sight, outlook) = (room.sight(place, 1.0), room.outlook(place, 1.0));
+        let mut random = Pcg64Mcg::seed_from_u64(8);
+        let mut vector = |reach: f64| Vector3::from_fn(|_, _| random.random_range(-reach..reach));
+        let mut differ = 0;
+        for _ in 0..2000 {
+            let towards = vector(1.0).normalize();
+            let mut rays =
+                Packet::<LANES> { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], counts: [true; LANES] };
+            for i in 0..LANES {
+                let (origin, direction) = (place + vector(0.5), (towards + vector(0.02)).normalize());
+                for axis in 0..3 {
+                    let [[origin], [direction]] = [alone(&origin)[axis], alone(&direction)[axis]];
+                    (rays.origin[axis][i], rays.direction[axis][i]) = (origin, direction);
+                }
+            }
+            let exact = meet_many(&room, &outlook, &rays).surfaces;
+            let quick = first_many(&sight, &rays.origin, &rays.direction, &rays.counts);
+            differ += exact.iter().zip(&quick).filter(|(exact, quick)| exact != quick).count();
+        }
+        // Of 32 000 rays: those within a thousandth of a millimetre of an edge.
+        assert!(differ <= 10, "{differ} rays meet other surfaces");
+    }
 }
