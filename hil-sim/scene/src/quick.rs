@@ -14,7 +14,7 @@ use crate::blur::spread;
 use crate::lens::Lens;
 use crate::quick_bundle::QuickBundle;
 use crate::quick_sensor::develop;
-use crate::rays::{Around, PosedLens, RayGrid};
+use crate::rays::{Around, PosedLens, RayGrid, directions_of_all};
 use crate::render::{Rows, View, lattice};
 use crate::texture::Rgb;
 use crate::texture_noise::mix64;

@@ -90,7 +90,7 @@ impl<'a> RayGrid<'a> {
         Self { posed, stride: columns as usize + 2, rays }
     }
 
-    /// The ray of a pixel of the rectangle; `None` outside the field.
+    /// The ray of a pixel; `None` outside the field.
     #[inline]
     pub fn around(&'a self, x: u32, y: u32) -> Option<Around<'a>> {
         let middle = (y as usize + 1) * self.stride + x as usize + 1;
