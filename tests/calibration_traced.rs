@@ -34,11 +34,19 @@ const FINE: u32 = 1000;
 #[derive(Clone, Copy)]
 struct Optics {
     design: &'static str,
-    mounted: Option<Mounting>,
+    mounted: Mounted,
     /// Number of views of each lens alone.
     views: usize,
     /// How far the middle of the target stands out, in millimetres.
     bow_mm: f64,
+}
+
+#[derive(Clone, Copy)]
+enum Mounted {
+    Perfectly,
+    By(Mounting),
+    /// As lenses are: by a share of [`BADLY`] that lies anywhere between none and all, which is what calibrations count on before any view.
+    AsUsual,
 }
 
 /// In micrometres and degrees.
@@ -49,17 +57,34 @@ struct Mounting {
     sensor_tilt_deg: f64,
 }
 
+const BADLY: Mounting = Mounting { decentre_um: 10.0, tilt_deg: 0.05, sensor_tilt_deg: 0.4 };
+
+impl Mounted {
+    /// How badly, and by which share of it; `None` of a lens whose elements are where they should be.
+    fn displacement(self, seed: u64) -> Option<Displacement> {
+        /// Multiples of the golden section lie evenly between 0 and 1.
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let (by, share) = match self {
+            Self::Perfectly => return None,
+            Self::By(mounting) => (mounting, 1.0),
+            Self::AsUsual => (BADLY, (0.37 + GOLDEN * seed as f64).fract()),
+        };
+        Some(Displacement {
+            decentre: Length::from_mm(share * 1e-3 * by.decentre_um),
+            tilt: Angle::from_deg(share * by.tilt_deg),
+            sensor_tilt: Angle::from_deg(share * by.sensor_tilt_deg),
+            seed,
+        })
+    }
+}
+
 impl Optics {
     /// In the place of an ideal lens. The seed decides where the elements are.
     fn before(self, ideal: &KannalaBrandt, seed: u64) -> TrueLens {
         let choice: LensChoice = self.design.parse().expect("a lens");
         let lens = choice.in_place_of(ideal).expect("a lens");
-        let (Some(by), TrueLens::Traced(traced)) = (self.mounted, &lens) else { return lens };
-        let displacement = Displacement {
-            decentre: Length::from_mm(1e-3 * by.decentre_um),
-            tilt: Angle::from_deg(by.tilt_deg),
-            sensor_tilt: Angle::from_deg(by.sensor_tilt_deg),
-            seed,
+        let (Some(displacement), TrueLens::Traced(traced)) = (self.mounted.displacement(seed), &lens) else {
+            return lens;
         };
         TrueLens::Traced(traced.clone().displaced(&displacement).expect("light in the whole field"))
     }
@@ -106,8 +131,9 @@ impl Bench {
         Rig::from_toml(&text).expect("a rig")
     }
 
+    /// The lenses, and whether the turn between the frames of barrel and calibration is taken out of errors.
     fn lenses(&self) -> ([&dyn Lens; 2], bool) {
-        ([&self.lenses[0], &self.lenses[1]], self.optics.mounted.is_some())
+        ([&self.lenses[0], &self.lenses[1]], matches!(self.optics.mounted, Mounted::By(_)))
     }
 }
 
@@ -172,12 +198,16 @@ fn views(usual: usize) -> usize {
     std::env::var("VERGENCE_VIEWS").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
+/// Lenses as they are mounted, with errors in the frame of the barrel: the file counts the turn between that frame and its own.
 fn check(design: &'static str) {
+    /// Nothing says that a lens is mounted as a Gaussian variable is drawn: one bench in ten has a NEES of 7 to 12, so that few may have a mean by so
+    /// much more than their band, times the root of their number.
+    const TAILS: f64 = 0.7;
     let seeds = seeds(3);
-    let found =
-        measured(Optics { design, mounted: None, views: views(20), bow_mm: 0.0 }, ["by-evidence", "central"], seeds);
+    let optics = Optics { design, mounted: Mounted::AsUsual, views: views(20), bow_mm: 0.0 };
+    let found = measured(optics, ["by-evidence", "central"], seeds);
     let [low, high] = bounds(seeds);
-    is_honest(design, &found[0], [low, high]);
+    is_honest(design, &found[0], [low, (1.0 + TAILS / (seeds as f64).sqrt()) * high]);
     for ((mode, _), central) in MODES.iter().zip(&found[1]) {
         assert!(central.nees > 1.5 * high, "{design}, {mode}: one centre is as good: {}", central.nees);
     }
@@ -198,7 +228,7 @@ fn clouds_through_a_nikkor_lens_are_as_far_off_as_the_rig_file_states() {
 #[test]
 fn clouds_after_a_bowed_target_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(2);
-    let optics = Optics { design: "sigma8_f18", mounted: None, views: views(20), bow_mm: 0.5 };
+    let optics = Optics { design: "sigma8_f18", mounted: Mounted::Perfectly, views: views(20), bow_mm: 0.5 };
     let found = measured(optics, ["by-evidence"], seeds);
     is_honest("after a bowed target", &found[0], bounds(seeds));
 }
@@ -208,7 +238,7 @@ fn clouds_after_a_bowed_target_are_as_far_off_as_the_rig_file_states() {
 fn clouds_through_ideal_lenses_are_as_far_off_as_the_rig_file_states() {
     const COST: f64 = 1.05;
     let seeds = seeds(3);
-    let optics = Optics { design: "ideal", mounted: None, views: views(20), bow_mm: 0.0 };
+    let optics = Optics { design: "ideal", mounted: Mounted::Perfectly, views: views(20), bow_mm: 0.0 };
     let [evidence, central, pupil] = measured(optics, ["by-evidence", "central", "moving-pupil"], seeds);
     is_honest("ideal", &evidence, bounds(seeds));
     for ((mode, _), (pupil, central)) in MODES.iter().zip(pupil.iter().zip(&central)) {
@@ -221,7 +251,7 @@ fn clouds_through_ideal_lenses_are_as_far_off_as_the_rig_file_states() {
 #[test]
 fn clouds_through_slightly_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(2);
-    let mounted = Some(Mounting { decentre_um: 5.0, tilt_deg: 0.03, sensor_tilt_deg: 0.2 });
+    let mounted = Mounted::By(Mounting { decentre_um: 5.0, tilt_deg: 0.03, sensor_tilt_deg: 0.2 });
     let optics = Optics { design: "sigma8_f18", mounted, views: views(20), bow_mm: 0.0 };
     let found = measured(optics, ["by-evidence"], seeds);
     let [low, high] = bounds(seeds);
@@ -233,8 +263,7 @@ fn clouds_through_slightly_displaced_lenses_are_as_far_off_as_the_rig_file_state
 #[test]
 fn clouds_through_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
     let seeds = seeds(3);
-    let mounted = Some(Mounting { decentre_um: 10.0, tilt_deg: 0.05, sensor_tilt_deg: 0.4 });
-    let optics = Optics { design: "sigma8_f18", mounted, views: views(20), bow_mm: 0.0 };
+    let optics = Optics { design: "sigma8_f18", mounted: Mounted::By(BADLY), views: views(20), bow_mm: 0.0 };
     let found = measured(optics, ["by-evidence", "moving-pupil", "central"], seeds);
     let [low, high] = bounds(seeds);
     // The turn of the frame, of which the covariance knows, is taken out of the errors.
@@ -252,7 +281,7 @@ fn clouds_through_displaced_lenses_are_as_far_off_as_the_rig_file_states() {
 fn without_noise_a_moving_pupil_leaves_little_error() {
     let models = ["by-evidence", "moving-pupil", "central"];
     for (design, most_mm) in [("sigma8_f18", [0.005, 0.06]), ("nikkor6_f28", [0.005, 0.15])] {
-        let optics = Optics { design, mounted: None, views: views(20), bow_mm: 0.0 };
+        let optics = Optics { design, mounted: Mounted::Perfectly, views: views(20), bow_mm: 0.0 };
         for seed in 0..seeds(1) {
             let found = trial(seed, optics, EXACT, models).map(|modes| modes.map(|found| found.error_mm));
             for (mode, (name, _)) in MODES.iter().enumerate() {
@@ -268,7 +297,7 @@ fn without_noise_a_moving_pupil_leaves_little_error() {
 /// The eyes turned by 120 degrees after the pair was calibrated: one centre, which hides the pupil in baseline and poses of targets, pays here.
 #[test]
 fn a_pair_moved_to_another_mode_by_exact_encoders_is_as_far_off_as_stated() {
-    let optics = Optics { design: "sigma8_f18", mounted: None, views: views(20), bow_mm: 0.0 };
+    let optics = Optics { design: "sigma8_f18", mounted: Mounted::Perfectly, views: views(20), bow_mm: 0.0 };
     let seeds = seeds(3);
     let [low, high] = bounds(seeds);
     let mean = |model: &str, noise: f64, of: fn(&Figures) -> f64| {
