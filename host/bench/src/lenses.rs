@@ -133,16 +133,24 @@ impl Array {
         Self { name, batch, rays, pixels, is_central }
     }
 
-    /// Seconds of projecting all, and of the way back.
+    /// Seconds of projecting all, and of the way back, into arrays that exist: in new memory, each page waits for the system first.
     fn seconds(&self, clock: Clock) -> [f64; 2] {
-        let count = self.rays.len();
-        let (mut pixels, mut rays, mut from) =
-            (Vec::with_capacity(count), Vec::with_capacity(count), Vec::with_capacity(count));
-        let project = timed(clock, || self.batch.project_points_into(black_box(&self.rays), &mut pixels)).1;
-        let unproject = match self.is_central {
-            true => timed(clock, || self.batch.unproject_into(black_box(&self.pixels), &mut rays)).1,
-            false => timed(clock, || self.batch.unproject_with_shifts_into(black_box(&self.pixels), &mut from)).1,
+        let (mut pixels, mut rays, mut from) = (Vec::new(), Vec::new(), Vec::new());
+        let mut project = || {
+            pixels.clear();
+            self.batch.project_points_into(black_box(&self.rays), &mut pixels);
         };
+        let mut unproject = || {
+            rays.clear();
+            from.clear();
+            match self.is_central {
+                true => self.batch.unproject_into(black_box(&self.pixels), &mut rays),
+                false => self.batch.unproject_with_shifts_into(black_box(&self.pixels), &mut from),
+            }
+        };
+        project();
+        unproject();
+        let [project, unproject] = [timed(clock, project).1, timed(clock, unproject).1];
         black_box((pixels, rays, from));
         [project, unproject]
     }
