@@ -1,7 +1,7 @@
 //! The noise of [`crate::texture_noise`] in single precision: the same cells and values, to far less than a grey level.
 
 use crate::packet::Singles;
-use crate::texture_noise::{PERSISTENCE, blended, survival};
+use crate::texture_noise::{PERSISTENCE, blended, survival, turned};
 
 /// [`crate::texture_noise::octaves`] in single precision; `footprints` that are not numbers count as so large that nothing is seen.
 #[inline(always)]
@@ -54,19 +54,6 @@ fn value_noise<const N: usize>(p: &Singles<N>, per_mm: f32, seeds: &[u32; N]) ->
         }
     }
     blended(&cells, &shares, seeds)
-}
-
-/// Turns the lattice between octaves as the exact noise does.
-#[inline(always)]
-fn turned<const N: usize>([x, y, z]: &Singles<N>) -> Singles<N> {
-    const THIRD: f32 = 1.0 / 3.0;
-    let mut turned = [[0.0; N]; 3];
-    for i in 0..N {
-        turned[0][i] = (2.0 * x[i] + 2.0 * y[i] - z[i]) * THIRD;
-        turned[1][i] = (-x[i] + 2.0 * y[i] + 2.0 * z[i]) * THIRD;
-        turned[2][i] = (2.0 * x[i] - y[i] + 2.0 * z[i]) * THIRD;
-    }
-    turned
 }
 
 #[cfg(test)]

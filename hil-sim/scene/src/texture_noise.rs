@@ -1,5 +1,7 @@
 //! Hashes, and smooth noise that never repeats within a room.
 
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
 use crate::packet::Triples;
 
 /// Ratio of the amplitudes of an octave and the next coarser one.
@@ -152,16 +154,19 @@ pub fn octaves<const N: usize>(
     sum
 }
 
-/// Turns the lattice between octaves, so that its axes do not show.
+/// Turns the lattice between octaves, so that its axes do not show, in the precision of its numbers.
 #[inline(always)]
-fn turned<const N: usize>([x, y, z]: &Triples<N>) -> Triples<N> {
+pub fn turned<T, const N: usize>([x, y, z]: &[[T; N]; 3]) -> [[T; N]; 3]
+where
+    T: Copy + From<f32> + Add<Output = T> + Sub<Output = T> + Mul<Output = T> + Div<Output = T> + Neg<Output = T>,
+{
     // Columns of an exact rational rotation: (2, -1, 2), (2, 2, -1), (-1, 2, 2) over 3.
-    const THIRD: f64 = 1.0 / 3.0;
-    let mut turned = [[0.0; N]; 3];
+    let (two, third) = (T::from(2.0), T::from(1.0) / T::from(3.0));
+    let mut turned = [*x; 3];
     for i in 0..N {
-        turned[0][i] = (2.0 * x[i] + 2.0 * y[i] - z[i]) * THIRD;
-        turned[1][i] = (-x[i] + 2.0 * y[i] + 2.0 * z[i]) * THIRD;
-        turned[2][i] = (2.0 * x[i] - y[i] + 2.0 * z[i]) * THIRD;
+        turned[0][i] = (two * x[i] + two * y[i] - z[i]) * third;
+        turned[1][i] = (-x[i] + two * y[i] + two * z[i]) * third;
+        turned[2][i] = (two * x[i] - y[i] + two * z[i]) * third;
     }
     turned
 }
