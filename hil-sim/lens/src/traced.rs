@@ -190,7 +190,7 @@ impl TracedLens {
             return None;
         }
         let across = point.mm().xy();
-        let outward = across.try_normalize(0.0).unwrap_or_else(Vector2::zeros);
+        let outward = outward(&across);
         Some(self.on_sensor_at(outward * self.radius_px(theta) + self.off_design(theta, outward)))
     }
 
@@ -230,7 +230,7 @@ impl TracedLens {
     /// The angle of light that the design images there, and the direction it comes from.
     fn by_design(&self, from_centre: Vector2<f64>) -> Option<(Angle, Vector2<f64>)> {
         let theta = self.height().argument_of(from_centre.norm() / self.pixels).map(Angle::from_rad)?;
-        Some((theta, from_centre.try_normalize(0.0).unwrap_or_else(Vector2::zeros)))
+        Some((theta, outward(&from_centre)))
     }
 
     /// How far displaced elements move the image, in pixels.
@@ -265,4 +265,9 @@ impl TracedLens {
         let Pixel { u, v } = self.sensor.centre;
         Pixel { u: u + from_centre.x, v: v + from_centre.y }
     }
+}
+
+/// The unit vector from the axis to a place. On the axis any one will do: displaced elements move the light there all the same.
+fn outward(place: &Vector2<f64>) -> Vector2<f64> {
+    place.try_normalize(0.0).unwrap_or_else(Vector2::x)
 }

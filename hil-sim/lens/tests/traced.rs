@@ -170,3 +170,20 @@ fn a_displaced_lens_images_as_its_rays_traced_one_by_one() {
         assert!(worst < 4e-4 && again < 1e-6 && moved > 0.5, "{worst} {again} {moved}");
     }
 }
+
+/// Where the direction across the axis is none.
+#[test]
+fn a_displaced_lens_moves_the_light_on_its_axis_as_that_beside_it() {
+    for design in BuiltIn::ALL {
+        let lens = lens(design).displaced(&MOUNTED).expect("a lens");
+        let image = |x: f64, y: f64| lens.project(&Point::from_mm(Vector3::new(x, y, 350.0))).expect("in the field");
+        let on_axis = image(0.0, 0.0);
+        for (x, y) in [(1e-7, 0.0), (0.0, 1e-7), (-1e-7, -1e-7)] {
+            let beside = image(x, y);
+            let apart = (beside.u - on_axis.u).hypot(beside.v - on_axis.v);
+            assert!(apart < 1e-3, "{apart} px at ({x}, {y}), {on_axis:?}");
+        }
+        let moved = (on_axis.u - SENSOR.centre.u).hypot(on_axis.v - SENSOR.centre.v);
+        assert!(moved > 0.5, "{moved} px");
+    }
+}
