@@ -18,7 +18,7 @@ use crate::KannalaBrandt;
 /// Rows per step.
 const LANES: usize = 64;
 /// Rows per step of the way back.
-const LANES_BACK: usize = 16;
+const LANES_BACK: usize = 32;
 /// Points nearer than so many times the pupil's coefficients are computed one by one.
 const NEAR: f64 = 40.0;
 /// The square of a distance in millimetres: farther points are computed one by one too.

@@ -11,8 +11,8 @@ use crate::Pixel;
 
 /// What rounding adds to t.
 const TINY: f64 = 1e-12;
-/// Rows per step: one vector of eight lanes for each polynomial.
-const LANES: usize = 8;
+/// Rows per step. With fewer, polynomials wait for their own sums.
+const LANES: usize = 32;
 /// Numbers of polynomial terms that are tried, fewest first.
 const TERMS: std::ops::RangeInclusive<usize> = 12..=48;
 
