@@ -1,9 +1,9 @@
 //! A simulated person who holds a calibration target before simulated cameras, at another place after every second image.
 
-use image::RgbImage;
+use image::{DynamicImage, RgbImage};
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_camera::{Camera, CameraError, CameraImage};
-use vergence_scene::{Lens, LensChoice, Optics, Scene, Sheet, Target, View, render};
+use vergence_scene::{Lens, LensChoice, Optics, Sheet, SheetView, Target, photograph_sheet};
 use vergence_vision::{Camera as CameraFrame, Frame, KannalaBrandt, Left, Point, Right, Side, Transform, World};
 
 use crate::Random;
@@ -118,7 +118,7 @@ impl Camera for TargetCamera {
     }
 }
 
-/// Image of a target alone before a grey background.
+/// Image of a target alone before a grey background, by a monochrome camera. Of the rays of a pixel, `samples` of the optics counts as 1.
 #[must_use]
 pub fn photograph_target(
     target: impl Into<Sheet>,
@@ -128,6 +128,7 @@ pub fn photograph_target(
     optics: &Optics,
     seed: u64,
 ) -> RgbImage {
-    let scene = Scene::target_alone(target, world_from_target);
-    render(&View { scene: &scene, camera: lens, world_from_camera, optics }, seed).image
+    let camera_from_sheet = world_from_camera.inverse() * world_from_target;
+    let view = SheetView { sheet: target.into(), camera_from_sheet, camera: lens, optics };
+    DynamicImage::from(photograph_sheet(&view, seed)).into_rgb8()
 }

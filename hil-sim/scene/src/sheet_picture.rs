@@ -159,8 +159,17 @@ struct Cells<'a> {
     view: SheetView<'a>,
     lens: LensRays<'a>,
     across: usize,
-    /// Value and derivatives per pixel (u, v, uu, uv, vv) at every square's middle; `None` at the edge of the field.
-    series: Vec<Option<[Node; 6]>>,
+    squares: Vec<Square>,
+}
+
+/// What is known of a square of pixels.
+enum Square {
+    /// Value and derivatives per pixel (u, v, uu, uv, vv) at its middle.
+    Inside([Node; 6]),
+    /// Each pixel is asked for.
+    Rim,
+    /// Of the field.
+    Outside,
 }
 
 impl<'a> Cells<'a> {
@@ -172,19 +181,23 @@ impl<'a> Cells<'a> {
             (0..down + 2).flat_map(|row| (0..across + 2).map(move |column| [middle(column), middle(row)])).collect();
         let lens = view.camera.rays();
         let nodes: Vec<Node> = lens.directions(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
-        let series = (0..down)
+        let squares = (0..down)
             .flat_map(|row| (0..across).map(move |column| [row + 1, column + 1]))
-            .map(|[row, column]| series(&nodes, across + 2, row, column))
+            .map(|[row, column]| square(&nodes, across + 2, row, column))
             .collect();
-        Self { view: *view, lens, across, series }
+        Self { view: *view, lens, across, squares }
     }
 
     /// The ray through a place `offset` pixels from the centre of a pixel; `None` outside the field.
     fn at(&self, plane: &Plane, [x, y]: [u32; 2], offset: [f64; 2]) -> Option<Node> {
         let index = (y / CELL) as usize * self.across + (x / CELL) as usize;
-        let Some([value, du, dv, duu, duv, dvv]) = &self.series[index] else {
-            let exact = self.lens.directions(&[[f64::from(x) + offset[0], f64::from(y) + offset[1]]]);
-            return exact.first().map(|ray| node(&self.view, plane, ray)).filter(|node| !node.z.is_nan());
+        let [value, du, dv, duu, duv, dvv] = match &self.squares[index] {
+            Square::Inside(series) => series,
+            Square::Outside => return None,
+            Square::Rim => {
+                let exact = self.lens.directions(&[[f64::from(x) + offset[0], f64::from(y) + offset[1]]]);
+                return exact.first().map(|ray| node(&self.view, plane, ray)).filter(|node| !node.z.is_nan());
+            }
         };
         let from_middle = |pixel: u32, offset: f64| f64::from(pixel % CELL) - 0.5 * f64::from(CELL - 1) + offset;
         let (u, v) = (from_middle(x, offset[0]), from_middle(y, offset[1]));
@@ -202,7 +215,7 @@ impl<'a> Cells<'a> {
     /// The sum of the light of some rays through a pixel.
     fn sum(&self, plane: &Plane, at: [u32; 2], lattice: &Lattice<'_>) -> f32 {
         let index = (at[1] / CELL) as usize * self.across + (at[0] / CELL) as usize;
-        let (Some(board), Some(series)) = (&plane.board, &self.series[index]) else {
+        let (Some(board), Square::Inside(series)) = (&plane.board, &self.squares[index]) else {
             return lattice.offsets().map(|offset| self.light(plane, at, offset)).sum();
         };
         let series = series.map(|node| [node[0], node[1], node[2], node[3]]);
@@ -232,11 +245,20 @@ fn node(view: &SheetView<'_>, plane: &Plane, ray: &[f64; 3]) -> Node {
     Node::from([x, y, z, pupil_mm, view.optics.light_at(theta, view.camera), view.camera.spot_variance(theta)])
 }
 
-fn series(nodes: &[Node], stride: usize, row: usize, column: usize) -> Option<[Node; 6]> {
+/// The field has no corners: it reaches into no square whose own middle and all those around lie outside.
+fn square(nodes: &[Node], stride: usize, row: usize, column: usize) -> Square {
+    let middles: [[Node; 3]; 3] =
+        std::array::from_fn(|down| std::array::from_fn(|right| nodes[(row + down - 1) * stride + column + right - 1]));
+    if middles.as_flattened().iter().all(|node| node.z.is_nan()) {
+        return Square::Outside;
+    }
+    series(&middles).map_or(Square::Rim, Square::Inside)
+}
+
+/// `None` where a middle lies outside the field.
+fn series(middles: &[[Node; 3]; 3]) -> Option<[Node; 6]> {
     let step = f64::from(CELL);
-    let near = |down: usize, right: usize| {
-        Some(nodes[(row + down - 1) * stride + column + right - 1]).filter(|node| !node.z.is_nan())
-    };
+    let near = |down: usize, right: usize| Some(middles[down][right]).filter(|node| !node.z.is_nan());
     let here = near(1, 1)?;
     let (west, east, north, south) = (near(1, 0)?, near(1, 2)?, near(0, 1)?, near(2, 1)?);
     let twist = near(2, 2)? - near(2, 0)? - near(0, 2)? + near(0, 0)?;

@@ -6,7 +6,7 @@
 
 mod simulated;
 
-use image::{DynamicImage, GrayImage};
+use image::GrayImage;
 use nalgebra::{Isometry3, SVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use simulated::{
@@ -17,9 +17,9 @@ use vergence_calibration::{
     ExtrinsicsOptions, IntrinsicsCalibration, IntrinsicsOptions, LensKnowledge, StereoView, calibrate_extrinsics,
     calibrate_intrinsics,
 };
-use vergence_scene::{Optics, Scene, Target, View, render};
+use vergence_scene::{Optics, SheetView, Target, photograph_sheet};
 use vergence_targets::{Corner, TargetSpec, TargetView, detect};
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform, World};
+use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform};
 
 const SPEC: TargetSpec = TargetSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
 const SHARED_VIEWS: usize = 12;
@@ -67,10 +67,8 @@ impl Shot {
 
     fn picture(&self, [left, top, width, height]: [u32; 4]) -> GrayImage {
         let camera = cut(&self.camera, [left, top, width, height]);
-        let target = Target { columns: COLUMNS, rows: ROWS, square: SPEC.square };
-        let place = Transform::<World, Target>::from_isometry(self.camera_from_target);
-        let scene = Scene::target_alone(target, place);
-        let world_from_camera = Transform::<World, Camera>::new(UnitQuaternion::identity(), Vector3::zeros());
+        let sheet = Target { columns: COLUMNS, rows: ROWS, square: SPEC.square }.into();
+        let camera_from_sheet = Transform::from_isometry(self.camera_from_target);
         // A noisy sensor: corners are then known to about 0.1 px.
         let optics = Optics {
             samples: 1,
@@ -80,8 +78,7 @@ impl Shot {
             shot_noise: 9.0,
             ..Optics::default()
         };
-        let view = View { scene: &scene, camera: &camera, world_from_camera, optics: &optics };
-        DynamicImage::from(render(&view, self.seed).image).to_luma8()
+        photograph_sheet(&SheetView { sheet, camera_from_sheet, camera: &camera, optics: &optics }, self.seed)
     }
 }
 
