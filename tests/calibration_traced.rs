@@ -9,21 +9,20 @@
 )]
 
 mod common;
+#[path = "common/mounted_lenses.rs"]
+mod mounted_lenses;
 #[path = "common/traced_points.rs"]
 mod traced_points;
 
 use common::built_bench::{Dice, POSES, as_built};
 use common::corner_files::{CORNER_PX, Lenses, calibrated_as, pair_calibrated_as};
 use common::rendered::seeds;
+use mounted_lenses::{BADLY, Mounted, Mounting};
 use nalgebra::{SMatrix, Vector3};
 use traced_points::{Figures, MATCH_PX, MODES, bounds, figures, figures_by, is_honest, means};
-use vergence_lens::Displacement;
 use vergence_rig::{Rig, RigPose};
-use vergence_scene::{Lens, LensChoice, TrueLens};
-use vergence_vision::{
-    Angle, KannalaBrandt, LENS_PARAMETERS, Left, Length, Pixel, Point, Right, SHARED_PARAMETERS, SharedCovariance,
-    Transform,
-};
+use vergence_scene::{Lens, TrueLens};
+use vergence_vision::{LENS_PARAMETERS, Left, Pixel, Point, Right, SHARED_PARAMETERS, SharedCovariance, Transform};
 
 /// Noise that is next to none, in parts of the usual.
 const EXACT: f64 = 1e-3;
@@ -41,55 +40,6 @@ struct Optics {
     bow_mm: f64,
 }
 
-#[derive(Clone, Copy)]
-enum Mounted {
-    Perfectly,
-    By(Mounting),
-    /// As lenses are: by a share of [`BADLY`] that lies anywhere between none and all, which is what calibrations count on before any view.
-    AsUsual,
-}
-
-/// In micrometres and degrees.
-#[derive(Clone, Copy)]
-struct Mounting {
-    decentre_um: f64,
-    tilt_deg: f64,
-    sensor_tilt_deg: f64,
-}
-
-const BADLY: Mounting = Mounting { decentre_um: 10.0, tilt_deg: 0.05, sensor_tilt_deg: 0.4 };
-
-impl Mounted {
-    /// How badly, and by which share of it; `None` of a lens whose elements are where they should be.
-    fn displacement(self, seed: u64) -> Option<Displacement> {
-        /// Multiples of the golden section lie evenly between 0 and 1.
-        const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let (by, share) = match self {
-            Self::Perfectly => return None,
-            Self::By(mounting) => (mounting, 1.0),
-            Self::AsUsual => (BADLY, (0.37 + GOLDEN * seed as f64).fract()),
-        };
-        Some(Displacement {
-            decentre: Length::from_mm(share * 1e-3 * by.decentre_um),
-            tilt: Angle::from_deg(share * by.tilt_deg),
-            sensor_tilt: Angle::from_deg(share * by.sensor_tilt_deg),
-            seed,
-        })
-    }
-}
-
-impl Optics {
-    /// In the place of an ideal lens. The seed decides where the elements are.
-    fn before(self, ideal: &KannalaBrandt, seed: u64) -> TrueLens {
-        let choice: LensChoice = self.design.parse().expect("a lens");
-        let lens = choice.in_place_of(ideal).expect("a lens");
-        let (Some(displacement), TrueLens::Traced(traced)) = (self.mounted.displacement(seed), &lens) else {
-            return lens;
-        };
-        TrueLens::Traced(traced.clone().displaced(&displacement).expect("light in the whole field"))
-    }
-}
-
 /// A bench of a seed, its lenses, and how much of the usual noise corners and matches have.
 struct Bench {
     rig: Rig,
@@ -105,7 +55,8 @@ impl Bench {
         for axis in &mut rig.axes {
             axis.counts_per_unit *= counts;
         }
-        let lenses = [optics.before(&rig.left_camera, 2 * seed), optics.before(&rig.right_camera, 2 * seed + 1)];
+        let lens = |ideal, seed| optics.mounted.lens(optics.design, ideal, seed);
+        let lenses = [lens(&rig.left_camera, 2 * seed), lens(&rig.right_camera, 2 * seed + 1)];
         Self { rig, lenses, optics, noise }
     }
 
