@@ -110,7 +110,8 @@ fn licences_are_permissive() {
 #[test]
 fn protocol_and_control_need_no_operating_system() {
     let output = Command::new(env!("CARGO"))
-        .args(["build", "--locked", "-p", "vergence-protocol", "-p", "vergence-control", "-p", "vergence-dynamixel"])
+        .args(["build", "--release", "--locked"])
+        .args(["-p", "vergence-protocol", "-p", "vergence-control", "-p", "vergence-dynamixel"])
         .args(["--target", "thumbv7em-none-eabihf", "--target-dir"])
         .arg(Path::new(env!("CARGO_TARGET_TMPDIR")).join("thumb"))
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
