@@ -32,12 +32,11 @@ pub fn blurred<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64) -> 
 }
 
 /// Steps from the narrowest to the widest spot of an image; between them it is interpolated, which is exact in the variance.
-const SPOT_STEPS: usize = 4;
+pub const SPOT_STEPS: usize = 4;
 
 /// Convolves an image as [`blurred`] does, with a Gaussian whose variance in square pixels is that of `sigma` plus that of the pixel's spot.
 pub fn spread<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64, spots: &[f32]) -> Vec<[f32; N]> {
-    let lit = spots.iter().copied().filter(|spot| *spot > 0.0);
-    let (low, high) = lit.fold((f32::INFINITY, 0.0), |(low, high): (f32, f32), spot| (low.min(spot), high.max(spot)));
+    let (low, high) = extremes(spots);
     if high == 0.0 {
         return blurred(image, width, sigma);
     }
@@ -57,6 +56,12 @@ pub fn spread<const N: usize>(image: &[[f32; N]], width: usize, sigma: f64, spot
     sum
 }
 
+/// The least and the most of the spots that there are.
+pub fn extremes(spots: &[f32]) -> (f32, f32) {
+    let lit = spots.iter().copied().filter(|spot| *spot > 0.0);
+    lit.fold((f32::INFINITY, 0.0), |(low, high): (f32, f32), spot| (low.min(spot), high.max(spot)))
+}
+
 /// Adds `row` times `weight` as far as both reach. Whole rows let the compiler use vector instructions.
 fn add<const N: usize>(sum: &mut [[f32; N]], weight: f32, row: &[[f32; N]]) {
     add_numbers(sum.as_flattened_mut(), weight, row.as_flattened());
@@ -64,7 +69,7 @@ fn add<const N: usize>(sum: &mut [[f32; N]], weight: f32, row: &[[f32; N]]) {
 
 /// [`add`] by the instructions of this machine: the same numbers on all.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-fn add_numbers(sum: &mut [f32], weight: f32, row: &[f32]) {
+pub fn add_numbers(sum: &mut [f32], weight: f32, row: &[f32]) {
     let count = sum.len().min(row.len());
     let (sum, row) = (&mut sum[..count], &row[..count]);
     for i in 0..count {
@@ -74,7 +79,7 @@ fn add_numbers(sum: &mut [f32], weight: f32, row: &[f32]) {
 
 /// Weights at the distances 0, 1, 2, … of the discrete Gaussian exp(-t) In(t), t = sigma², whose variance is exactly
 /// sigma² on the pixel grid (T. Lindeberg, "Scale-space for discrete signals", PAMI 12(3), 1990, eq. 19).
-fn discrete_gaussian(sigma: f64) -> Vec<f32> {
+pub fn discrete_gaussian(sigma: f64) -> Vec<f32> {
     const NEGLIGIBLE: f64 = 1e-6;
     const TERMS: u32 = 80;
     let t = sigma.clamp(0.0, MAX_SIGMA_PX).powi(2);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::packet::Triples;
+use crate::real::Real;
 use crate::texture::Rgb;
 
 /// A lamp as a point, whose light falls off with the distance.
@@ -35,50 +35,51 @@ pub struct Lighting {
 impl Lamp {
     /// The parts of the lamp's power that arrive at `points` on a surface with `normals` where nothing is between; from behind not above 0.
     #[inline(always)]
-    pub fn shares<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [f32; N] {
+    pub fn shares<T: Real, const N: usize>(&self, points: &[[T; N]; 3], normals: &[[T; N]; 3]) -> [f32; N] {
+        let (at, half_distance) = ([0, 1, 2].map(|axis| T::of(self.position[axis])), T::of(self.half_distance));
         let mut shares = [0.0; N];
         for i in 0..N {
-            let [x, y, z] =
-                [self.position.x - points[0][i], self.position.y - points[1][i], self.position.z - points[2][i]];
+            let [x, y, z] = [at[0] - points[0][i], at[1] - points[1][i], at[2] - points[2][i]];
             let distance = (x * x + y * y + z * z).sqrt();
-            let cosine = (normals[0][i] * x + normals[1][i] * y + normals[2][i] * z) / distance.max(1.0);
-            let reach = distance / self.half_distance;
-            shares[i] = (cosine * (1.0 / (1.0 + reach * reach))) as f32;
+            let cosine = (normals[0][i] * x + normals[1][i] * y + normals[2][i] * z) / distance.max(T::of(1.0));
+            let reach = distance / half_distance;
+            shares[i] = (cosine * (T::of(1.0) / (T::of(1.0) + reach * reach))).single();
         }
         shares
     }
 }
 
 impl Lighting {
-    /// Irradiance by ambient light at `points` on a surface with `normals`, both in the world.
+    /// The parts of the ambient irradiance that arrive at `points` on a surface with `normals`, both in the world.
     #[inline(always)]
-    pub fn ambients<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [Rgb; N] {
-        let opennesses = self.opennesses(points, normals);
-        let mut sums = [[0.0; 3]; N];
+    pub fn ambients<T: Real, const N: usize>(&self, points: &[[T; N]; 3], normals: &[[T; N]; 3]) -> [f32; N] {
+        let (opennesses, from_above) = (self.opennesses(points, normals), T::of(self.from_above));
+        let mut parts = [0.0; N];
         for i in 0..N {
             // y is down.
-            let above = 1.0 - self.from_above * normals[1][i];
-            let part = (above * opennesses[i]) as f32;
-            sums[i] = [self.ambient[0] * part, self.ambient[1] * part, self.ambient[2] * part];
+            let above = T::of(1.0) - from_above * normals[1][i];
+            parts[i] = (above * opennesses[i]).single();
         }
-        sums
+        parts
     }
 
     /// The part of ambient light that reaches points near the room's sides; a side does not shade itself.
     #[inline(always)]
-    fn opennesses<const N: usize>(&self, points: &Triples<N>, normals: &Triples<N>) -> [f64; N] {
+    fn opennesses<T: Real, const N: usize>(&self, points: &[[T; N]; 3], normals: &[[T; N]; 3]) -> [T; N] {
         const REACH_MM: f64 = 220.0;
-        let mut open = [1.0; N];
+        let one = T::of(1.0);
+        let mut open = [one; N];
         if self.occlusion == 0.0 {
             return open;
         }
-        let [low, high] = self.room;
+        let occlusion = T::of(self.occlusion);
         for axis in 0..3 {
+            let [low, high] = self.room.map(|corner| T::of(corner[axis]));
             for i in 0..N {
-                let nearest = (points[axis][i] - low[axis]).min(high[axis] - points[axis][i]).max(0.0);
-                let away = 1.0 + nearest * (1.0 / REACH_MM);
-                let near = 1.0 / (away * away);
-                open[i] *= 1.0 - self.occlusion * near * (1.0 - normals[axis][i].abs());
+                let nearest = (points[axis][i] - low).min(high - points[axis][i]).max(T::of(0.0));
+                let away = one + nearest * T::of(1.0 / REACH_MM);
+                let near = one / (away * away);
+                open[i] = open[i] * (one - occlusion * near * (one - normals[axis][i].abs()));
             }
         }
         open

@@ -4,13 +4,13 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::real::Real;
+
 /// Rays that are followed at once where many are: as many as the largest vector registers hold single precision numbers.
 pub const LANES: usize = 16;
 
-/// Light that is followed in double precision, with what that costs.
-pub const EXACT: u8 = 0;
-/// Light that is followed in single precision where this does not show.
-pub const QUICK: u8 = 1;
+/// The same for images in real time.
+pub const QUICK_LANES: usize = 64;
 
 /// Three components of `N` vectors.
 pub type Triples<const N: usize> = [[f64; N]; 3];
@@ -20,19 +20,19 @@ pub type Singles<const N: usize> = [[f32; N]; 3];
 
 /// Rays in the world; those that do not count have any numbers.
 #[derive(Clone, Copy, Debug)]
-pub struct Packet<const N: usize> {
+pub struct Packet<T, const N: usize> {
     /// Where they start, mm.
-    pub origin: Triples<N>,
+    pub origin: [[T; N]; 3],
     /// Their directions, of any length.
-    pub direction: Triples<N>,
+    pub direction: [[T; N]; 3],
     /// Which of them count.
     pub counts: [bool; N],
 }
 
 /// Sums of products.
 #[inline(always)]
-pub fn dots<const N: usize>(a: &Triples<N>, b: &Triples<N>) -> [f64; N] {
-    let mut sums = [0.0; N];
+pub fn dots<T: Real, const N: usize>(a: &[[T; N]; 3], b: &[[T; N]; 3]) -> [T; N] {
+    let mut sums = [T::of(0.0); N];
     for i in 0..N {
         sums[i] = a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i];
     }
@@ -41,10 +41,10 @@ pub fn dots<const N: usize>(a: &Triples<N>, b: &Triples<N>) -> [f64; N] {
 
 /// `turn` applied to each vector.
 #[inline(always)]
-pub fn turned<const N: usize>(turn: &Matrix3<f64>, vectors: &Triples<N>) -> Triples<N> {
-    let mut turned = [[0.0; N]; 3];
+pub fn turned<T: Real, const N: usize>(turn: &Matrix3<f64>, vectors: &[[T; N]; 3]) -> [[T; N]; 3] {
+    let mut turned = *vectors;
     for (row, turned) in turned.iter_mut().enumerate() {
-        let [x, y, z] = [turn[(row, 0)], turn[(row, 1)], turn[(row, 2)]];
+        let [x, y, z] = [T::of(turn[(row, 0)]), T::of(turn[(row, 1)]), T::of(turn[(row, 2)])];
         for i in 0..N {
             turned[i] = x * vectors[0][i] + y * vectors[1][i] + z * vectors[2][i];
         }
@@ -54,10 +54,10 @@ pub fn turned<const N: usize>(turn: &Matrix3<f64>, vectors: &Triples<N>) -> Trip
 
 /// Each vector less `middle`.
 #[inline(always)]
-pub fn less<const N: usize>(vectors: &Triples<N>, middle: &Vector3<f64>) -> Triples<N> {
+pub fn less<T: Real, const N: usize>(vectors: &[[T; N]; 3], middle: &Vector3<f64>) -> [[T; N]; 3] {
     let mut less = *vectors;
     for (component, middle) in less.iter_mut().zip(middle.iter()) {
-        component.iter_mut().for_each(|value| *value -= middle);
+        component.iter_mut().for_each(|value| *value = *value - T::of(*middle));
     }
     less
 }
@@ -76,8 +76,12 @@ pub fn singles<const N: usize>(vectors: &Triples<N>) -> Singles<N> {
 
 /// The places on rays at their `ranges`.
 #[inline(always)]
-pub fn at_ranges<const N: usize>(origin: &Triples<N>, direction: &Triples<N>, ranges: &[f64; N]) -> Triples<N> {
-    let mut places = [[0.0; N]; 3];
+pub fn at_ranges<T: Real, const N: usize>(
+    origin: &[[T; N]; 3],
+    direction: &[[T; N]; 3],
+    ranges: &[T; N],
+) -> [[T; N]; 3] {
+    let mut places = *origin;
     for axis in 0..3 {
         for i in 0..N {
             places[axis][i] = origin[axis][i] + direction[axis][i] * ranges[i];
@@ -132,4 +136,14 @@ pub fn largest<T: PartialOrd + Copy, const N: usize>(values: &[T; N], members: &
         half /= 2;
     }
     largest[0]
+}
+
+/// Whether any of the values is above `least`.
+#[inline(always)]
+pub fn any_above<const N: usize>(values: &[f32; N], least: f32) -> bool {
+    let mut above = 0;
+    for value in values {
+        above |= u32::from(*value > least);
+    }
+    above != 0
 }

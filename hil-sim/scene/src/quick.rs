@@ -4,48 +4,71 @@
 //! ray or a neighbour's meets something else, or another light. A ray that meets what a neighbour shows takes the neighbour's light. What depends on lens and pixel alone is computed once, in a [`RayTable`].
 //! Nothing is displaced from where [`render`](crate::render) shows it: places on a pixel's square are symmetric about its centre.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use image::RgbImage;
-use nalgebra::Vector3;
 use rayon::prelude::*;
-use vergence_vision::{Angle, Camera, Transform, World};
+use vergence_vision::{Angle, Camera, ImageSize, Transform, World};
 
 use crate::Optics;
-use crate::blur::spread;
 use crate::lens::Lens;
-use crate::quick_bundle::QuickBundle;
+use crate::packet::QUICK_LANES;
+use crate::quick_bundle::{Block, QuickBundle};
+use crate::quick_edges::edge_lights;
+use crate::quick_eye::{Eye, TileEyes};
 use crate::quick_sensor::develop;
-use crate::rays::{Around, PosedLens, RayGrid, directions_of_all};
-use crate::render::{Rows, View, lattice};
-use crate::texture::Rgb;
+use crate::rays::directions_of_all;
+use crate::render::{Rows, View};
+use crate::sight::Sight;
 use crate::texture_noise::mix64;
 use crate::trace::NOTHING;
 
-/// Further rays of a pixel at an edge between surfaces, and at one within a surface: those of prints are measured.
-const EDGE_RAYS: [u32; 2] = [6, 16];
+/// Number of rows that one task renders: some tiles.
+pub const BAND: usize = TILE;
 
-/// Number of rows that one task renders.
-const BAND: usize = 8;
-
-/// Difference of the square roots of the light of neighbours above which more rays are cast.
-const EDGE: f32 = 0.4;
+/// Rows and columns of pixels whose rays are followed side by side: what is side by side shows few surfaces.
+pub const TILE: usize = 8;
 
 /// What a lens does with each pixel: computed once for all images of the size of its sensor.
 #[derive(Clone, Debug)]
 pub struct RayTable {
-    /// Of the pixels and one more on every side, row by row, in the camera's frame. Not numbers outside the field.
-    rays: Vec<[f64; 3]>,
-    pixels: Vec<PixelOptics>,
+    pub(crate) size: ImageSize,
+    /// Components of the rays of the pixels and one more on every side, row by row, in the camera's frame. Not numbers outside the field.
+    pub(crate) rays: [Vec<f32>; 3],
+    /// Of the pixels: radians from one to the next.
+    pub(crate) pitches: Vec<f32>,
+    /// The share of the light that passes the lens.
+    exposures: Vec<f32>,
+    /// Variance of the lens's own spot, in square pixels.
+    pub(crate) spots: Vec<f32>,
+    /// How far along the axis from the camera's origin light crosses it, mm.
+    pub(crate) pupils: Vec<f32>,
+    /// Of earlier images, to be used again: new memory takes the system a tenth of an image's time.
+    canvases: Arc<Mutex<Vec<Canvas>>>,
 }
 
-/// What light goes through on its way to a pixel.
-#[derive(Clone, Copy, Debug)]
-struct PixelOptics {
-    /// Radians from one pixel to the next.
-    pitch: f32,
-    /// The share of the light that passes the lens.
-    exposure: f32,
-    /// Variance of the lens's own spot, in square pixels.
-    spot: f32,
+/// The rows of an image that is being made.
+pub type Canvas = Vec<CanvasRow>;
+
+/// What the rays through the centres of a row of pixels meet.
+#[derive(Clone, Debug)]
+pub struct CanvasRow {
+    /// Red, green and blue; none outside the field.
+    pub light: [Vec<f32>; 3],
+    /// The square root of the mean of the colours.
+    pub levels: Vec<f32>,
+    /// Numbers of the surfaces; [`NOTHING`] where nothing is met, and outside the field.
+    pub surfaces: Vec<u32>,
+}
+
+impl CanvasRow {
+    fn new(width: usize) -> Self {
+        Self {
+            light: [const { Vec::new() }; 3].map(|_: Vec<f32>| vec![0.0; width]),
+            levels: vec![0.0; width],
+            surfaces: vec![NOTHING; width],
+        }
+    }
 }
 
 impl RayTable {
@@ -54,34 +77,51 @@ impl RayTable {
     pub fn new(lens: &dyn Lens, optics: &Optics) -> Self {
         let (size, lens_rays) = (lens.size(), lens.rays());
         let rays = directions_of_all(size, &lens_rays);
-        let of_ray = |ray: &[f64; 3]| {
-            let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
-            PixelOptics {
-                pitch: (1.0 / lens.pixels_per_radian(theta)) as f32,
-                exposure: optics.light_at(theta, lens) as f32,
-                spot: if ray[2].is_nan() { 0.0 } else { lens.spot_variance(theta) as f32 },
-            }
-        };
         let (width, stride) = (size.width as usize, size.width as usize + 2);
         let inner = rays.par_chunks(stride).skip(1).take(size.height as usize);
-        let pixels = inner.flat_map_iter(|row| row[1..=width].iter().map(of_ray)).collect();
-        Self { rays, pixels }
+        let thetas: Vec<Angle> = inner
+            .flat_map_iter(|row| row[1..=width].iter().map(|ray| Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos())))
+            .collect();
+        let of_each = |value: &(dyn Fn(Angle) -> f64 + Sync)| -> Vec<f32> {
+            let in_field = |theta: &Angle| if theta.rad().is_nan() { 0.0 } else { value(*theta) as f32 };
+            thetas.par_iter().map(in_field).collect()
+        };
+        Self {
+            size,
+            rays: [0, 1, 2].map(|axis| rays.iter().map(|ray| ray[axis] as f32).collect()),
+            pitches: of_each(&|theta| 1.0 / lens.pixels_per_radian(theta)),
+            exposures: of_each(&|theta| optics.light_at(theta, lens)),
+            spots: of_each(&|theta| lens.spot_variance(theta)),
+            pupils: of_each(&|theta| lens.pupil(theta).map_or(0.0, |shift| shift.mm())),
+            canvases: Arc::default(),
+        }
     }
-}
 
-/// What the ray through the centre of a pixel meets.
-#[derive(Clone, Copy)]
-struct Glance {
-    light: Rgb,
-    /// The square root of the mean of its colours.
-    level: f32,
-    /// Number of the surface; [`NOTHING`] where nothing is met, and outside the field.
-    surface: u32,
-}
+    /// Whether a pixel is within the field.
+    pub(crate) fn is_seen(&self, x: usize, y: usize) -> bool {
+        !self.rays[2][(y + 1) * (self.size.width as usize + 2) + x + 1].is_nan()
+    }
 
-impl Default for Glance {
-    fn default() -> Self {
-        Self { light: [0.0; 3], level: 0.0, surface: NOTHING }
+    fn canvas(&self) -> Canvas {
+        let used = self.canvases.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        used.unwrap_or_else(|| vec![CanvasRow::new(self.size.width as usize); self.size.height as usize])
+    }
+
+    /// The rays of the tile of pixels whose first is (`x`, `y`).
+    fn tile(&self, x: usize, y: usize, eyes: &TileEyes, block: &mut Block) {
+        let (width, height) = (self.size.width as usize, self.size.height as usize);
+        let (mut pupils, mut rays) = ([0.0; QUICK_LANES], [[f32::NAN; QUICK_LANES]; 3]);
+        let columns = TILE.min(width - x);
+        for row in 0..TILE.min(height - y) {
+            let (lanes, pixel) = (row * TILE..row * TILE + columns, (y + row) * width + x);
+            let from = (y + row + 1) * (width + 2) + x + 1;
+            for (rays, component) in rays.iter_mut().zip(&self.rays) {
+                rays[lanes.clone()].copy_from_slice(&component[from..from + columns]);
+            }
+            pupils[lanes.clone()].copy_from_slice(&self.pupils[pixel..pixel + columns]);
+            block.spreads[lanes].copy_from_slice(&self.pitches[pixel..pixel + columns]);
+        }
+        eyes.aim(&mut block.rays, &rays, &pupils);
     }
 }
 
@@ -94,127 +134,68 @@ pub fn render_quick(
     seed: u64,
     world_from_camera: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
 ) -> RgbImage {
-    let (size, rows) = (view.camera.size(), Rows { at_once: 1, world_from_camera });
-    let width = (size.width as usize).max(1);
-    let (place, slack) = rows.reach(view);
-    let (sight, lens_rays) = (view.scene.sight(place, slack), view.camera.rays());
-    let eyes = |top: usize, rows: usize| -> Vec<PosedLens<'_>> {
-        (top..top + rows).map(|y| PosedLens::new(view.camera, &lens_rays, &world_from_camera(y as u32))).collect()
-    };
-
-    let mut glances = vec![Glance::default(); table.pixels.len()];
-    glances.par_chunks_mut(width * BAND).enumerate().for_each(|(band, glances)| {
-        let (top, rows) = (band * BAND, glances.len() / width);
-        let eyes = eyes(top, rows);
-        let mut centres = QuickBundle::default();
-        for [x, y] in tiled(width, rows) {
-            let (y_of_image, optics) = (top + y, &table.pixels[(top + y) * width + x]);
-            let grid = RayGrid::of_table(&eyes[y], &table.rays, size.width);
-            if let Some(around) = grid.around(x as u32, y_of_image as u32) {
-                centres.push(y * width + x, around.start(&around.centre()), around.centre(), optics.pitch);
-            }
-        }
-        centres.follow(
-            view.scene,
-            &sight,
-            |_, _| true,
-            |at, surface, light| {
-                glances[at] = Glance { light, level: (light.iter().sum::<f32>() / 3.0).sqrt(), surface };
-            },
-        );
+    let (place, slack) = Rows { at_once: 1, world_from_camera }.reach(view);
+    let (sight, lens) = (view.scene.sight(place, slack), view.camera.rays());
+    let eyes: Vec<Eye> = (0..table.size.height).into_par_iter().map(|y| Eye::new(&world_from_camera(y))).collect();
+    let mut canvas = table.canvas();
+    canvas.par_chunks_mut(BAND).enumerate().for_each_init(QuickBundle::default, |bundle, (band, rows)| {
+        glance(view, table, &sight, bundle, (band * BAND, &eyes[band * BAND..]), rows);
     });
-
-    let mut image = vec![[0.0; 3]; glances.len()];
-    image.par_chunks_mut(width * BAND).enumerate().for_each(|(band, pixels)| {
-        let (top, first) = (band * BAND, band * BAND * width);
-        let eyes = eyes(top, pixels.len() / width);
-        let (mut rays, mut edges, mut counts) = (QuickBundle::default(), Vec::new(), vec![1.0; pixels.len()]);
-        for (at, pixel) in pixels.iter_mut().enumerate() {
-            let [x, y] = [at % width, at / width];
-            *pixel = glances[first + at].light;
-            let Some(edge) = edge(&glances, width, x, top + y) else { continue };
-            let grid = RayGrid::of_table(&eyes[y], &table.rays, size.width);
-            let Some(around) = grid.around(x as u32, (top + y) as u32) else { continue };
-            let pitch = table.pixels[first + at].pitch;
-            let places = EDGE_RAYS[usize::from(edge.within)];
-            // A ray outside the field brings no light.
-            for ray in rays_of(&around, lattice(places, mix64(seed ^ (first + at) as u64))) {
-                rays.push(edges.len(), around.start(&ray), ray, pitch);
-            }
-            counts[at] += places as f32;
-            edges.push((at, edge));
-        }
-        rays.follow(
-            view.scene,
-            &sight,
-            |edge, surface| edges[edge].1.light_of(&glances, surface).is_none(),
-            |edge, surface, light| {
-                let (at, edge) = &edges[edge];
-                let light = edge.light_of(&glances, surface).unwrap_or(light);
-                pixels[*at] = [0, 1, 2].map(|i| pixels[*at][i] + light[i]);
-            },
-        );
-        for ((pixel, optics), count) in pixels.iter_mut().zip(&table.pixels[first..]).zip(counts) {
-            *pixel = pixel.map(|c| c * optics.exposure / count);
+    let bands = eyes.par_chunks(BAND).enumerate();
+    let edges: Vec<_> = bands
+        .map_init(QuickBundle::default, |bundle, (band, eyes)| {
+            edge_lights((view, table, &lens, seed), &sight, bundle, (&canvas, band * BAND, eyes))
+        })
+        .collect();
+    for ([x, y], light) in edges.into_iter().flatten() {
+        (0..3).for_each(|channel| canvas[y].light[channel][x] = light[channel]);
+    }
+    let width = (table.size.width as usize).max(1);
+    canvas.par_iter_mut().zip(table.exposures.par_chunks(width)).for_each(|(row, exposures)| {
+        for light in &mut row.light {
+            light.iter_mut().zip(exposures).for_each(|(light, exposure)| *light *= exposure);
         }
     });
-    let spots: Vec<f32> = table.pixels.iter().map(|pixel| pixel.spot).collect();
-    develop(&spread(&image, width, view.optics.blur_px, &spots), &table.rays, view, !mix64(seed))
+    let image = develop(&canvas, table, view.optics, !mix64(seed));
+    table.canvases.lock().unwrap_or_else(PoisonError::into_inner).push(canvas);
+    image
 }
 
-/// The places (x, y) of a band of so many columns and rows, square by square: what is side by side shows few surfaces.
-fn tiled(columns: usize, rows: usize) -> impl Iterator<Item = [usize; 2]> {
-    const SIDE: usize = 4;
-    let tops = (0..rows).step_by(SIDE).flat_map(move |top| (0..columns).step_by(SIDE).map(move |left| [left, top]));
-    tops.flat_map(move |[left, top]| {
-        let of_tile = move |y| (left..(left + SIDE).min(columns)).map(move |x| [x, y]);
-        (top..(top + SIDE).min(rows)).flat_map(of_tile)
-    })
-}
-
-/// The rays through these places on a pixel, in pixels from its centre. Between neighbours they are taken to change evenly, which is wrong by
-/// less than a thousandth of a pixel.
-fn rays_of(around: &Around<'_>, places: impl Iterator<Item = [f64; 2]>) -> impl Iterator<Item = Vector3<f64>> {
-    let (centre, slopes) = (around.centre(), around.slopes());
-    let nearby = slopes.is_none().then(|| around.nearby());
-    places.filter_map(move |place| match slopes {
-        Some([du, dv]) => Some(centre + du * place[0] + dv * place[1]),
-        None => nearby.as_ref()?.at(place),
-    })
-}
-
-/// A pixel, then those left, right, above and below of it, one of which shows something else; itself again in place of those beside the image.
-struct Edge {
-    pixels: [usize; 5],
-    /// Whether the light differs much within one surface, which the rays then must see for themselves.
-    within: bool,
-}
-
-impl Edge {
-    /// The light of a surface that one of the pixels shows.
-    fn light_of(&self, glances: &[Glance], surface: u32) -> Option<Rgb> {
-        let mut shown = self.pixels.iter().map(|pixel| &glances[*pixel]);
-        shown.find(|glance| glance.surface == surface && !self.within).map(|glance| glance.light)
+/// What the rays through the centres of the pixels of some rows meet, of which the first is row `top`.
+fn glance(
+    view: &View<'_>,
+    table: &RayTable,
+    sight: &Sight,
+    bundle: &mut QuickBundle,
+    (top, eyes): (usize, &[Eye]),
+    rows: &mut [CanvasRow],
+) {
+    let width = table.size.width as usize;
+    for (y, of_rows) in (0..rows.len()).step_by(TILE).zip(eyes.chunks(TILE)) {
+        let eyes = TileEyes::new(of_rows);
+        for x in (0..width).step_by(TILE) {
+            let block = bundle.add_block();
+            table.tile(x, top + y, &eyes, block);
+            block.owners[0] = (y * width + x) as u32;
+            if !block.rays.counts.iter().any(|counts| *counts) {
+                bundle.drop_block();
+            }
+        }
     }
-}
-
-/// The edge at a pixel, if it shows something else than one beside, above or below it.
-fn edge(glances: &[Glance], width: usize, x: usize, y: usize) -> Option<Edge> {
-    let at = y * width + x;
-    let beside = |is_there: bool, other: usize| if is_there { other } else { at };
-    let pixels = [
-        at,
-        beside(x > 0, at.saturating_sub(1)),
-        beside(x + 1 < width, at + 1),
-        beside(y > 0, at.saturating_sub(width)),
-        beside(at + width < glances.len(), at + width),
-    ];
-    let here = &glances[at];
-    let (mut within, mut differs) = (false, false);
-    for other in pixels.map(|pixel| &glances[pixel]) {
-        let is_same = other.surface == here.surface;
-        within |= is_same & ((other.level - here.level).abs() > EDGE);
-        differs |= !is_same;
+    bundle.follow(view.scene, sight, |_, _| true);
+    for block in bundle.blocks() {
+        let [left, top] = [block.owners[0] as usize % width, block.owners[0] as usize / width];
+        let ([red, green, blue], mut levels) = (&block.lights, [0.0; QUICK_LANES]);
+        for (i, level) in levels.iter_mut().enumerate() {
+            *level = ((red[i] + green[i] + blue[i]) / 3.0).sqrt();
+        }
+        for (row, lanes) in rows[top..].iter_mut().zip((0..QUICK_LANES).step_by(TILE)) {
+            for i in (0..TILE).filter(|i| block.rays.counts[lanes + i]) {
+                let (x, lane) = (left + i, lanes + i);
+                (0..3).for_each(|channel| row.light[channel][x] = block.lights[channel][lane]);
+                (row.levels[x], row.surfaces[x]) = (levels[lane], block.surfaces[lane]);
+            }
+        }
     }
-    (within | differs).then_some(Edge { pixels, within })
+    bundle.clear();
 }

@@ -2,94 +2,145 @@
 //!
 //! Rays that meet one surface do the same, so that none of those side by side waits for another.
 
-use nalgebra::Vector3;
-
 use crate::Scene;
-use crate::packet::{LANES, Packet};
+use crate::packet::{Packet, QUICK_LANES, Singles};
+use crate::radiance::glance_many;
 use crate::sight::{Sight, first_many};
-use crate::texture::Rgb;
-use crate::trace::{NOTHING, glance_many};
+use crate::trace::NOTHING;
 
 /// Rays in the order in which they were gathered.
 #[derive(Debug, Default)]
-pub struct QuickBundle(Vec<Ray>);
+pub struct QuickBundle {
+    blocks: Vec<Block>,
+    /// Those of the last block.
+    in_last: usize,
+}
 
+/// Rays that are followed side by side, and what they found.
 #[derive(Clone, Copy, Debug)]
-struct Ray {
-    /// Which pixel it is of.
-    owner: u32,
-    origin: Vector3<f64>,
-    direction: Vector3<f64>,
+pub struct Block {
+    /// In the world; only some count.
+    pub rays: Packet<f32, QUICK_LANES>,
+    /// Which pixels they are of.
+    pub owners: [u32; QUICK_LANES],
     /// Radians to the neighbouring rays.
-    spread: f64,
+    pub spreads: [f32; QUICK_LANES],
+    /// What they meet first, or [`NOTHING`], and how far away that is, mm.
+    pub surfaces: [u32; QUICK_LANES],
+    ranges: [f32; QUICK_LANES],
+    /// Red, green and blue, where they were wanted.
+    pub lights: Singles<QUICK_LANES>,
+}
+
+impl Block {
+    /// Without rays that count.
+    pub const EMPTY: Self = Self {
+        rays: Packet {
+            origin: [[0.0; QUICK_LANES]; 3],
+            direction: [[0.0; QUICK_LANES]; 3],
+            counts: [false; QUICK_LANES],
+        },
+        owners: [0; QUICK_LANES],
+        spreads: [0.0; QUICK_LANES],
+        surfaces: [NOTHING; QUICK_LANES],
+        ranges: [0.0; QUICK_LANES],
+        lights: [[0.0; QUICK_LANES]; 3],
+    };
+
+    /// Puts ray `from` of another block at `to`.
+    fn take(&mut self, to: usize, other: &Self, from: usize) {
+        for axis in 0..3 {
+            self.rays.origin[axis][to] = other.rays.origin[axis][from];
+            self.rays.direction[axis][to] = other.rays.direction[axis][from];
+        }
+        (self.rays.counts[to], self.spreads[to], self.ranges[to]) = (true, other.spreads[from], other.ranges[from]);
+    }
+
+    fn give_light(&mut self, scene: &Scene, surface: u32) {
+        self.lights = glance_many(scene, surface, &self.rays, [&self.ranges, &self.spreads]);
+    }
 }
 
 impl QuickBundle {
     /// Adds a ray of a pixel, in the world.
-    pub fn push(&mut self, owner: usize, origin: Vector3<f64>, direction: Vector3<f64>, spread: f32) {
-        self.0.push(Ray { owner: owner as u32, origin, direction, spread: f64::from(spread) });
+    pub fn push(&mut self, owner: usize, origin: [f32; 3], direction: [f32; 3], spread: f32) {
+        if self.blocks.is_empty() || self.in_last == QUICK_LANES {
+            self.add_block();
+            self.in_last = 0;
+        }
+        let (Some(block), at) = (self.blocks.last_mut(), self.in_last) else { return };
+        for axis in 0..3 {
+            (block.rays.origin[axis][at], block.rays.direction[axis][at]) = (origin[axis], direction[axis]);
+        }
+        (block.rays.counts[at], block.owners[at], block.spreads[at]) = (true, owner as u32, spread);
+        self.in_last += 1;
     }
 
-    /// Follows the rays, and calls `visit(owner, surface, light)` for each of them in their order; none is left.
-    /// `wants_light(owner, surface)` tells whether a ray that meets this surface needs its light, which takes most of the time.
-    pub fn follow(
-        &mut self,
-        scene: &Scene,
-        sight: &Sight,
-        wants_light: impl Fn(usize, u32) -> bool,
-        mut visit: impl FnMut(usize, u32, Rgb),
-    ) {
-        let mut surfaces = Vec::with_capacity(self.0.len());
-        for rays in self.0.chunks(LANES) {
-            let (packet, _) = side_by_side(rays.iter());
-            let first = first_many(sight, &packet.origin, &packet.direction, &packet.counts);
-            surfaces.extend_from_slice(&first[..rays.len()]);
+    /// Adds rays that are side by side, and which the caller sets.
+    pub fn add_block(&mut self) -> &mut Block {
+        self.in_last = QUICK_LANES;
+        self.blocks.push_mut(Block::EMPTY)
+    }
+
+    /// Takes the last block away.
+    pub fn drop_block(&mut self) {
+        self.blocks.pop();
+    }
+
+    /// What is in the bundle.
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// Takes all rays away.
+    pub fn clear(&mut self) {
+        self.blocks.clear();
+    }
+
+    /// Follows the rays, and notes in the blocks what they found. `wants_light(owner, surface)` tells whether a ray that meets this surface
+    /// needs its light, which takes most of the time.
+    pub fn follow(&mut self, scene: &Scene, sight: &Sight, wants_light: impl Fn(usize, u32) -> bool) {
+        let mut alone = Vec::new();
+        for (number, block) in self.blocks.iter_mut().enumerate() {
+            (block.surfaces, block.ranges) = first_many(sight, &block.rays);
+            for (lights, backdrop) in block.lights.iter_mut().zip(scene.backdrop) {
+                *lights = [backdrop; QUICK_LANES];
+            }
+            let mut wanted = [false; QUICK_LANES];
+            for (wanted, (surface, owner)) in wanted.iter_mut().zip(block.surfaces.iter().zip(&block.owners)) {
+                *wanted = *surface != NOTHING && wants_light(*owner as usize, *surface);
+            }
+            let first = wanted.iter().position(|wanted| *wanted).map(|first| block.surfaces[first]);
+            let Some(surface) = first else { continue };
+            if wanted.iter().zip(&block.surfaces).all(|(wanted, other)| *wanted & (*other == surface)) {
+                block.give_light(scene, surface);
+                continue;
+            }
+            for i in (0..QUICK_LANES).filter(|&i| wanted[i]) {
+                alone.push(u64::from(block.surfaces[i]) << 32 | (number * QUICK_LANES + i) as u64);
+            }
         }
-        let mut lights = vec![scene.backdrop; self.0.len()];
-        let wanted = |ray: usize| surfaces[ray] != NOTHING && wants_light(self.0[ray].owner as usize, surfaces[ray]);
-        let by_surface = sorted(&surfaces, scene.solids.len(), wanted);
-        for of_surface in by_surface.chunk_by(|a, b| surfaces[*a as usize] == surfaces[*b as usize]) {
-            for numbers in of_surface.chunks(LANES) {
-                let surface = surfaces[numbers[0] as usize];
-                let (packet, spreads) = side_by_side(numbers.iter().map(|ray| &self.0[*ray as usize]));
-                let found = glance_many(scene, surface, &packet, &spreads);
-                for (ray, light) in numbers.iter().zip(found) {
-                    lights[*ray as usize] = light;
+        self.light_alone(scene, alone);
+    }
+
+    /// Light for rays beside which others meet other surfaces: those of one surface together. The upper half of each number is the
+    /// surface's, the lower half the ray's.
+    fn light_alone(&mut self, scene: &Scene, mut rays: Vec<u64>) {
+        rays.sort_unstable();
+        for of_surface in rays.chunk_by(|a, b| a >> 32 == b >> 32) {
+            for members in of_surface.chunks(QUICK_LANES) {
+                let mut together = Block::EMPTY;
+                for (to, ray) in members.iter().enumerate() {
+                    let ray = *ray as u32 as usize;
+                    together.take(to, &self.blocks[ray / QUICK_LANES], ray % QUICK_LANES);
+                }
+                together.give_light(scene, (members[0] >> 32) as u32);
+                for (from, ray) in members.iter().enumerate() {
+                    let ray = *ray as u32 as usize;
+                    let (block, to) = (&mut self.blocks[ray / QUICK_LANES], ray % QUICK_LANES);
+                    (0..3).for_each(|channel| block.lights[channel][to] = together.lights[channel][from]);
                 }
             }
         }
-        for ((ray, surface), light) in self.0.drain(..).zip(surfaces).zip(lights) {
-            visit(ray.owner as usize, surface, light);
-        }
     }
-}
-
-/// The numbers of the rays that are wanted, by surface, and within one in their order.
-fn sorted(surfaces: &[u32], count: usize, wanted: impl Fn(usize) -> bool) -> Vec<u32> {
-    let wanted: Vec<u32> = (0..surfaces.len()).filter(|&ray| wanted(ray)).map(|ray| ray as u32).collect();
-    let mut next = vec![0_usize; count + 1];
-    wanted.iter().for_each(|&ray| next[surfaces[ray as usize] as usize + 1] += 1);
-    for surface in 1..next.len() {
-        next[surface] += next[surface - 1];
-    }
-    let mut sorted = vec![0; wanted.len()];
-    for ray in wanted {
-        let place = &mut next[surfaces[ray as usize] as usize];
-        sorted[*place] = ray;
-        *place += 1;
-    }
-    sorted
-}
-
-/// Up to as many rays as there are lanes, with their spreads.
-fn side_by_side<'a>(rays: impl Iterator<Item = &'a Ray>) -> (Packet<LANES>, [f64; LANES]) {
-    let none = [[0.0; LANES]; 3];
-    let (mut packet, mut spreads) = (Packet { origin: none, direction: none, counts: [false; LANES] }, [0.0; LANES]);
-    for (i, ray) in rays.enumerate() {
-        for axis in 0..3 {
-            (packet.origin[axis][i], packet.direction[axis][i]) = (ray.origin[axis], ray.direction[axis]);
-        }
-        (packet.counts[i], spreads[i]) = (true, ray.spread);
-    }
-    (packet, spreads)
 }

@@ -1,4 +1,4 @@
-//! The image that a sensor makes of light, for images in real time.
+//! The image that lens and sensor make of light, for images in real time.
 
 use std::sync::LazyLock;
 
@@ -6,11 +6,12 @@ use image::RgbImage;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use crate::Optics;
 use crate::optics::encoded;
-use crate::packet::LANES;
-use crate::render::View;
-use crate::texture::Rgb;
-use crate::texture_noise::mix64;
+use crate::packet::{LANES, Singles};
+use crate::quick::{Canvas, RayTable};
+use crate::quick_spread::{Spread, SpreadRows};
+use crate::texture_noise::mix;
 
 /// The grey level of light, 0 to 1, before noise, at steps of its square root.
 static LEVELS: LazyLock<Vec<f32>> = LazyLock::new(|| {
@@ -18,24 +19,28 @@ static LEVELS: LazyLock<Vec<f32>> = LazyLock::new(|| {
 });
 const LEVEL_STEPS: usize = 4096;
 
-/// Read noise, shot noise and gain: as in [`Optics`](crate::Optics).
+/// Read noise, shot noise and gain: as in [`Optics`].
 type Sensor = [f32; 3];
 
-/// The image that the sensor makes of light; black outside the field, where `rays` of the pixels and of one more on every side are not numbers.
-pub fn develop(light: &[Rgb], rays: &[[f64; 3]], view: &View<'_>, noise: u64) -> RgbImage {
-    let (size, optics) = (view.camera.size(), view.optics);
-    let width = (size.width as usize).max(1);
+/// The image that lens and sensor make of the light on a canvas; black outside the field.
+pub fn develop(canvas: &Canvas, table: &RayTable, optics: &Optics, noise: u64) -> RgbImage {
+    let width = table.size.width as usize;
     let sensor = [optics.read_noise, optics.shot_noise, optics.gain].map(|value| value.max(0.0) as f32);
-    let levels: &[f32] = &LEVELS;
-    let mut image = RgbImage::new(size.width, size.height);
-    image.par_chunks_exact_mut(3 * width).zip(light.par_chunks(width)).enumerate().for_each(|(y, (row, light))| {
-        let in_field = &rays[(y + 1) * (width + 2) + 1..];
-        for (part, (pixels, light)) in row.chunks_mut(3 * LANES).zip(light.chunks(LANES)).enumerate() {
-            let mut lights = [[0.0; 3]; LANES];
-            lights[..light.len()].copy_from_slice(light);
-            let first = part * LANES;
-            let bytes = exposed(&lights, sensor, levels, noise, (y * width + first) as u64);
-            for (i, pixel) in pixels.chunks_exact_mut(3).enumerate().filter(|(i, _)| !in_field[first + i][2].is_nan()) {
+    let (levels, spread): (&[f32], _) = (&LEVELS, Spread::new(optics.blur_px, &table.spots));
+    let mut image = RgbImage::new(table.size.width, table.size.height);
+    let rows = image.par_chunks_exact_mut(3 * width.max(1)).enumerate();
+    rows.for_each_init(<[SpreadRows; 3]>::default, |spread_rows, (y, row)| {
+        for (channel, rows) in spread_rows.iter_mut().enumerate() {
+            spread.row(canvas, (channel, y), &table.spots[y * width..], rows);
+        }
+        for (part, pixels) in row.chunks_mut(3 * LANES).enumerate() {
+            let (first, count) = (part * LANES, pixels.len() / 3);
+            let mut lights = [[0.0; LANES]; 3];
+            for (lights, rows) in lights.iter_mut().zip(&*spread_rows) {
+                lights[..count].copy_from_slice(&rows.light[first..first + count]);
+            }
+            let bytes = exposed(&lights, sensor, levels, noise, (y * width + first) as u32);
+            for (i, pixel) in pixels.chunks_exact_mut(3).enumerate().filter(|(i, _)| table.is_seen(first + i, y)) {
                 pixel.copy_from_slice(&[0, 1, 2].map(|channel| bytes[channel][i]));
             }
         }
@@ -45,18 +50,17 @@ pub fn develop(light: &[Rgb], rays: &[[f64; 3]], view: &View<'_>, noise: u64) ->
 
 /// The bytes of pixels side by side, of which the first has this number, by the instructions of this machine: the same on all.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-fn exposed(lights: &[Rgb; LANES], sensor: Sensor, levels: &[f32], noise: u64, first: u64) -> [[u8; LANES]; 3] {
+fn exposed(lights: &Singles<LANES>, sensor: Sensor, levels: &[f32], noise: u64, first: u32) -> [[u8; LANES]; 3] {
     let [read, shot, gain] = sensor;
     let (mut bytes, mut hashes) = ([[0; LANES]; 3], [0; LANES]);
     for (hash, number) in hashes.iter_mut().zip(first..) {
-        *hash = mix64(noise ^ number);
+        *hash = mix(number ^ noise as u32) ^ (noise >> 32) as u32;
     }
     for (channel, bytes) in bytes.iter_mut().enumerate() {
         let (mut steps, mut shown, mut normals) = ([0_u32; LANES], [0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            hashes[i] = mix64(hashes[i]);
-            normals[i] = normal(hashes[i]);
-            let root = (gain * lights[i][channel]).clamp(0.0, 1.0).sqrt();
+            normals[i] = normal(hashes[i], channel as u32);
+            let root = (gain * lights[channel][i]).clamp(0.0, 1.0).sqrt();
             steps[i] = (root * LEVEL_STEPS as f32 + 0.5) as u32;
         }
         for i in 0..LANES {
@@ -71,13 +75,15 @@ fn exposed(lights: &[Rgb; LANES], sensor: Sensor, levels: &[f32], noise: u64, fi
     bytes
 }
 
-/// A number of mean 0 and variance 1 from a hash: how many of its bits are set, with a uniform number between two such counts. Its excess
-/// kurtosis is -1/32.
+/// A number of mean 0 and variance 1 from a hash and the number of a channel: how many of 64 hashed bits are set, with a uniform number
+/// between two such counts. Its excess kurtosis is -1/32.
 #[inline(always)]
-fn normal(hash: u64) -> f32 {
+fn normal(hash: u32, channel: u32) -> f32 {
     const BITS_MEAN: f32 = 32.0;
     // The variance of 64 fair bits, and that of the uniform number.
     const VARIANCE: f32 = 16.0 + 1.0 / 12.0;
-    let between = (mix64(!hash) >> 40) as f32 / 16_777_216.0 - 0.5;
-    (hash.count_ones() as f32 - BITS_MEAN + between) / VARIANCE.sqrt()
+    let salt = channel.wrapping_mul(0x9e37_79b9);
+    let (low, high) = (mix(hash.wrapping_add(salt)), mix(hash.wrapping_add(salt) ^ 0x6a09_e667));
+    let between = ((low ^ high.rotate_left(16)).wrapping_mul(0x85eb_ca6b) >> 8) as f32 / 16_777_216.0 - 0.5;
+    ((low.count_ones() + high.count_ones()) as f32 - BITS_MEAN + between) / VARIANCE.sqrt()
 }

@@ -111,18 +111,6 @@ impl<'a> Around<'a> {
         self.grid.posed.start(direction)
     }
 
-    /// How the ray changes per pixel along u and v, by its neighbours'; `None` at the edge of the field.
-    #[inline]
-    pub fn slopes(&self) -> Option<[Vector3<f64>; 2]> {
-        let (rays, stride) = (&self.grid.rays, self.grid.stride);
-        let slope = |before: usize, after: usize| {
-            let [before, after] = [before, after].map(|place| Vector3::from(rays[place]));
-            let slope = self.grid.posed.world_from_camera * (0.5 * (after - before));
-            (!slope.x.is_nan()).then_some(slope)
-        };
-        Some([slope(self.middle - 1, self.middle + 1)?, slope(self.middle - stride, self.middle + stride)?])
-    }
-
     /// The rays about the pixel's centre.
     pub fn nearby(&self) -> Nearby<'a> {
         let (grid, centre) = (self.grid, self.centre);

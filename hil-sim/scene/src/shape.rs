@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::packet::{Triples, at_ranges, dots};
+use crate::packet::{Singles, Triples, at_ranges, dots};
+use crate::real::Real;
 
 /// A contact nearer than this (mm) is taken for the surface that the ray starts from.
 pub const NEAREST_MM: f64 = 1e-6;
@@ -40,15 +41,15 @@ const HIGH_CAP: u64 = 2;
 
 /// Points on a shape, with coordinates for textures.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfacePoints<const N: usize> {
+pub struct SurfacePoints<T, const N: usize> {
     /// In the shape's frame, mm.
-    pub position: Triples<N>,
+    pub position: [[T; N]; 3],
     /// Coordinates in mm along the surface (spheres: the position's x and y).
-    pub uv: [[f64; N]; 2],
+    pub uv: [[T; N]; 2],
     /// Number of the face of the shape.
     pub face: [u32; N],
     /// Extent of a pixel at the point, mm.
-    pub footprint: [f64; N],
+    pub footprint: [T; N],
 }
 
 impl Shape {
@@ -111,6 +112,48 @@ impl Shape {
         normals
     }
 
+    /// [`Self::normals`] at `positions` on the surface, by these alone, but for the side of a rectangle that rays of these directions meet.
+    #[inline(always)]
+    pub fn outward<const N: usize>(&self, positions: &Singles<N>, directions: &Singles<N>) -> Singles<N> {
+        let (p, mut normals) = (positions, [[0.0; N]; 3]);
+        match *self {
+            Self::Rectangle { .. } => {
+                for i in 0..N {
+                    normals[2][i] = -directions[2][i].signum();
+                }
+            }
+            Self::Ellipse { .. } => normals[2] = [1.0; N],
+            Self::Block { half } => {
+                let inverse = half.map(|half| half.recip() as f32);
+                for i in 0..N {
+                    let parts = [p[0][i] * inverse.x, p[1][i] * inverse.y, p[2][i] * inverse.z];
+                    let sizes = [parts[0].abs(), parts[1].abs(), parts[2].abs()];
+                    let is_x = (sizes[0] >= sizes[1]) & (sizes[0] >= sizes[2]);
+                    let is_z = !is_x & (sizes[2] > sizes[1]);
+                    normals[0][i] = if is_x { parts[0].signum() } else { 0.0 };
+                    normals[1][i] = if is_x | is_z { 0.0 } else { parts[1].signum() };
+                    normals[2][i] = if is_z { parts[2].signum() } else { 0.0 };
+                }
+            }
+            Self::Sphere { radius } => {
+                let inverse = radius.recip() as f32;
+                normals = *p;
+                normals.as_flattened_mut().iter_mut().for_each(|component| *component *= inverse);
+            }
+            Self::Cylinder { radius, half_height } => {
+                let (radius, inverse, half_height) = (radius as f32, radius.recip() as f32, half_height as f32);
+                for i in 0..N {
+                    let [x, y, z] = [p[0][i], p[1][i], p[2][i]];
+                    let on_cap = y.abs() - half_height > (x * x + z * z).sqrt() - radius;
+                    normals[0][i] = if on_cap { 0.0 } else { x * inverse };
+                    normals[1][i] = if on_cap { y.signum() } else { 0.0 };
+                    normals[2][i] = if on_cap { 0.0 } else { z * inverse };
+                }
+            }
+        }
+        normals
+    }
+
     /// Half the size of the axis-aligned box about the shape after `rotation`.
     pub fn half_extent(&self, rotation: &Matrix3<f64>) -> Vector3<f64> {
         match *self {
@@ -131,35 +174,48 @@ impl Shape {
 
     /// The texture coordinates of `position`s, points on the surface where `normal`s stand out.
     #[inline(always)]
-    pub fn surface_points<const N: usize>(
+    pub fn surface_points<T: Real, const N: usize>(
         &self,
-        position: Triples<N>,
-        normal: &Triples<N>,
-        footprint: [f64; N],
-    ) -> SurfacePoints<N> {
-        let p = &position;
+        position: [[T; N]; 3],
+        normal: &[[T; N]; 3],
+        footprint: [T; N],
+    ) -> SurfacePoints<T, N> {
+        let (p, zero) = (&position, T::of(0.0));
         let (mut uv, mut face) = ([p[0], p[1]], [0; N]);
         match *self {
-            Self::Rectangle { .. } | Self::Ellipse { .. } => face = normal[2].map(|z| u32::from(z > 0.0)),
-            Self::Sphere { .. } => face = p[2].map(|z| u32::from(z > 0.0)),
+            Self::Rectangle { .. } | Self::Ellipse { .. } => {
+                for i in 0..N {
+                    face[i] = u32::from(normal[2][i] > zero);
+                }
+            }
+            Self::Sphere { .. } => {
+                for i in 0..N {
+                    face[i] = u32::from(p[2][i] > zero);
+                }
+            }
             Self::Block { .. } => {
                 for i in 0..N {
                     let sizes = [normal[0][i].abs(), normal[1][i].abs(), normal[2][i].abs()];
-                    let axis =
-                        if sizes[0] >= sizes[1].max(sizes[2]) { 0 } else { 1 + usize::from(sizes[2] > sizes[1]) };
-                    let (across, along) = [(2, 1), (0, 2), (0, 1)][axis];
-                    (uv[0][i], uv[1][i]) = (p[across][i], p[along][i]);
-                    face[i] = 2 * axis as u32 + u32::from(normal[axis][i] > 0.0);
+                    let (is_x, is_z) = (sizes[0] >= sizes[1].max(sizes[2]), sizes[2] > sizes[1]);
+                    let [x, y, z] = [p[0][i], p[1][i], p[2][i]];
+                    // Across and along, and the sign of the face.
+                    let (u, v, number, side) = if is_x {
+                        (z, y, 0, normal[0][i])
+                    } else if is_z {
+                        (x, y, 4, normal[2][i])
+                    } else {
+                        (x, z, 2, normal[1][i])
+                    };
+                    (uv[0][i], uv[1][i]) = (u, v);
+                    face[i] = number | u32::from(side > zero);
                 }
             }
             Self::Cylinder { radius, .. } => {
                 for i in 0..N {
-                    if normal[1][i].abs() > 0.5 {
-                        (uv[0][i], uv[1][i]) = (p[0][i], p[2][i]);
-                        face[i] = 1 + u32::from(normal[1][i] > 0.0);
-                    } else {
-                        uv[0][i] = radius * p[0][i].atan2(p[2][i]);
-                    }
+                    let on_cap = normal[1][i].abs() > T::of(0.5);
+                    let around = T::of(radius) * p[0][i].atan2(p[2][i]);
+                    (uv[0][i], uv[1][i]) = if on_cap { (p[0][i], p[2][i]) } else { (around, p[1][i]) };
+                    face[i] = if on_cap { 1 + u32::from(normal[1][i] > zero) } else { 0 };
                 }
             }
         }

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use crate::Target;
 use crate::packet::LANES;
-use crate::texture_noise::split;
+use crate::real::Real;
 
 /// A chessboard as rays in its own frame meet it.
 pub struct Board {
@@ -48,7 +48,7 @@ pub fn lights(board: &Board, series: &Series, [u, v]: &[[f64; LANES]; 2]) -> [f3
         let met = (range > 0.0) & (across.abs() <= board.half[0]) & (down.abs() <= board.half[1]);
         let (column, row) = (across / square + 0.5 * columns, down / square + 0.5 * rows);
         let printed = (column >= 0.0) & (column < columns) & (row >= 0.0) & (row < rows);
-        let is_black = printed & ((split(column).0 + split(row).0) & 1 == 0);
+        let is_black = printed & ((column.split().0 + row.split().0) & 1 == 0);
         let [beside, back, black, white] = board.lights;
         let printed = if is_black { black } else { white };
         let seen = if z[i] < 0.0 { back } else { printed };

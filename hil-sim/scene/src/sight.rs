@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use nalgebra::Vector3;
 
 use crate::outlook::Outlook;
-use crate::packet::{LANES, Singles, Triples, largest, singles};
+use crate::packet::{Packet, QUICK_LANES, Singles, any_above, dots, less};
 use crate::scene::Solid;
 use crate::span::{SolidFrom, Spans};
 use crate::trace::NOTHING;
@@ -19,7 +19,7 @@ pub struct Sight {
 
 impl Sight {
     /// Cells of the outlook over which rays that are followed together are spread: of neighbouring pixels seldom more.
-    pub const OVERLAP: usize = 1;
+    pub const OVERLAP: usize = 2;
 
     /// Of these of all `solids` that `outlook` shows, about its place.
     pub fn new(solids: &[Solid], outlook: Outlook) -> Self {
@@ -27,30 +27,21 @@ impl Sight {
         Self { place, solids: solids.iter().map(|solid| SolidFrom::new(solid, &place)).collect(), outlook }
     }
 
-    /// `points` in the world less the place.
+    /// The first surfaces on rays of unit length, and how far they are (mm): [`NOTHING`] where there is none or the ray does not count.
     #[inline(always)]
-    fn offsets<const N: usize>(&self, points: &Triples<N>) -> Singles<N> {
-        let mut offsets = [[0.0; N]; 3];
-        for axis in 0..3 {
-            for i in 0..N {
-                offsets[axis][i] = (points[axis][i] - self.place[axis]) as f32;
-            }
+    fn first<const N: usize>(&self, rays: &Packet<f32, N>) -> ([u32; N], [f32; N]) {
+        let offsets = less(&rays.origin, &self.place);
+        let (mut surfaces, mut ranges) = ([NOTHING; N], [f32::NEG_INFINITY; N]);
+        for (range, counts) in ranges.iter_mut().zip(&rays.counts) {
+            // Nothing is nearer than what a ray that does not count meets.
+            *range = if *counts { f32::INFINITY } else { f32::NEG_INFINITY };
         }
-        offsets
-    }
-
-    /// The first surfaces on rays of unit length, and [`NOTHING`] where there is none or the ray does not count.
-    #[inline(always)]
-    fn first<const N: usize>(&self, origins: &Triples<N>, directions: &Triples<N>, counts: &[bool; N]) -> [u32; N] {
-        let (offsets, singles) = (self.offsets(origins), singles(directions));
-        let (mut surfaces, mut ranges) = ([NOTHING; N], [f32::INFINITY; N]);
-        let cells = self.outlook.cells(&singles);
-        let mut candidates = self.outlook.candidates(counts, &cells);
+        let mut candidates = self.outlook.candidates(&rays.counts, &self.outlook.cells(&rays.direction));
         while let Some(candidate) = candidates.next() {
-            if candidate.from_mm > largest(&ranges, counts, f32::NEG_INFINITY) {
+            if !any_above(&ranges, candidate.from_mm) {
                 break;
             }
-            let Spans { enter, leave } = self.solids[candidate.shape as usize].spans(&offsets, &singles);
+            let Spans { enter, leave } = self.solids[candidate.shape as usize].spans(&offsets, &rays.direction);
             for i in 0..N {
                 let range = if enter[i] > 0.0 { enter[i] } else { leave[i] };
                 let nearer = (enter[i] <= leave[i]) & (range > 0.0) & (range < ranges[i]);
@@ -58,24 +49,23 @@ impl Sight {
                 ranges[i] = if nearer { range } else { ranges[i] };
             }
         }
-        surfaces
+        (surfaces, ranges)
     }
 
     /// Those of the points asked for, all of the surface `own`, between which and the place nothing stands.
     #[inline(always)]
-    pub fn reached<const N: usize>(&self, points: &Triples<N>, own: u32, asked: &[bool; N]) -> [bool; N] {
+    pub fn reached<const N: usize>(&self, points: &Singles<N>, own: u32, asked: &[bool; N]) -> [bool; N] {
         // So near its end, as a share of its length, a ray has met the surface that it is to reach.
         const END: f32 = 1.0 - 2e-5;
-        let directions = self.offsets(points);
-        let mut distances = [0.0; N];
+        let directions = less(points, &self.place);
+        // Of those that are not reached the distance is less than any.
+        let mut distances = dots(&directions, &directions);
         for i in 0..N {
-            let [x, y, z] = [directions[0][i], directions[1][i], directions[2][i]];
-            distances[i] = (x * x + y * y + z * z).sqrt();
+            distances[i] = if asked[i] { distances[i].sqrt() } else { f32::NEG_INFINITY };
         }
-        let mut reached = *asked;
         let mut candidates = self.outlook.candidates(asked, &self.outlook.cells(&directions));
         while let Some(candidate) = candidates.next() {
-            if candidate.from_mm > largest(&distances, &reached, f32::NEG_INFINITY) {
+            if !any_above(&distances, candidate.from_mm) {
                 break;
             }
             // A convex surface that faces the place does not stand before itself.
@@ -85,8 +75,12 @@ impl Sight {
             let Spans { enter, leave } = self.solids[candidate.shape as usize].spans_from_place(&directions);
             for i in 0..N {
                 let is_between = (enter[i] <= leave[i]) & (leave[i] > 0.0) & (enter[i] < END);
-                reached[i] &= !is_between;
+                distances[i] = if is_between { f32::NEG_INFINITY } else { distances[i] };
             }
+        }
+        let mut reached = [false; N];
+        for i in 0..N {
+            reached[i] = distances[i] >= 0.0;
         }
         reached
     }
@@ -94,13 +88,8 @@ impl Sight {
 
 /// [`Sight::first`] of many rays, by the instructions of this machine: the same numbers on all.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-pub fn first_many(
-    sight: &Sight,
-    origins: &Triples<LANES>,
-    directions: &Triples<LANES>,
-    counts: &[bool; LANES],
-) -> [u32; LANES] {
-    sight.first(origins, directions, counts)
+pub fn first_many(sight: &Sight, rays: &Packet<f32, QUICK_LANES>) -> ([u32; QUICK_LANES], [f32; QUICK_LANES]) {
+    sight.first(rays)
 }
 
 #[cfg(test)]
@@ -110,7 +99,7 @@ mod tests {
 
     use super::*;
     use crate::Scene;
-    use crate::packet::{Packet, alone};
+    use crate::packet::{LANES, alone, singles};
     use crate::trace::meet_many;
 
     #[test]
@@ -124,7 +113,7 @@ mod tests {
         for _ in 0..2000 {
             let towards = vector(1.0).normalize();
             let mut rays =
-                Packet::<LANES> { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], counts: [true; LANES] };
+                Packet::<f64, LANES> { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], counts: [true; LANES] };
             for i in 0..LANES {
                 let (origin, direction) = (place + vector(0.5), (towards + vector(0.02)).normalize());
                 for axis in 0..3 {
@@ -133,7 +122,9 @@ mod tests {
                 }
             }
             let exact = meet_many(&room, &outlook, &rays).surfaces;
-            let quick = first_many(&sight, &rays.origin, &rays.direction, &rays.counts);
+            let quick =
+                Packet { origin: singles(&rays.origin), direction: singles(&rays.direction), counts: rays.counts };
+            let (quick, _) = sight.first(&quick);
             differ += exact.iter().zip(&quick).filter(|(exact, quick)| exact != quick).count();
         }
         // Of 32 000 rays: those within a thousandth of a millimetre of an edge.

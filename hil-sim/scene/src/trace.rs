@@ -6,9 +6,8 @@ use vergence_vision::{Length, Point, UnitRay, World};
 
 use crate::Scene;
 use crate::outlook::Outlook;
-use crate::packet::{
-    EXACT, LANES, Packet, QUICK, Triples, alone, at_ranges, dots, largest, less, next_value, one_of, singles, turned,
-};
+use crate::packet::{LANES, Packet, Triples, alone, at_ranges, largest, less, next_value, one_of, singles, turned};
+use crate::radiance::Contacts;
 use crate::scene::Solid;
 use crate::sight::Sight;
 use crate::texture::Rgb;
@@ -48,7 +47,7 @@ impl<const N: usize> Encounters<N> {
 
 /// [`Scene::encounters`] of many rays, by the instructions of this machine: the same numbers on all.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-pub fn meet_many(scene: &Scene, outlook: &Outlook, rays: &Packet<LANES>) -> Encounters<LANES> {
+pub fn meet_many(scene: &Scene, outlook: &Outlook, rays: &Packet<f64, LANES>) -> Encounters<LANES> {
     scene.encounters(outlook, rays)
 }
 
@@ -56,17 +55,11 @@ pub fn meet_many(scene: &Scene, outlook: &Outlook, rays: &Packet<LANES>) -> Enco
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
 pub fn light_many(
     scene: &Scene,
-    rays: &Packet<LANES>,
+    rays: &Packet<f64, LANES>,
     met: &Encounters<LANES>,
     spreads: &[f64; LANES],
 ) -> [Rgb; LANES] {
     scene.lights(rays, met, spreads)
-}
-
-/// [`Scene::glances`] of many rays, by the instructions of this machine: the same numbers on all.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-pub fn glance_many(scene: &Scene, surface: u32, rays: &Packet<LANES>, spreads: &[f64; LANES]) -> [Rgb; LANES] {
-    scene.glances(surface, rays, spreads)
 }
 
 impl Scene {
@@ -88,7 +81,7 @@ impl Scene {
     }
 
     /// The first surface on the ray from `origin` along the unit vector `direction`, both in the world.
-    fn encounter(&self, origin: Vector3<f64>, direction: Vector3<f64>) -> Option<(Packet<1>, Encounters<1>)> {
+    fn encounter(&self, origin: Vector3<f64>, direction: Vector3<f64>) -> Option<(Packet<f64, 1>, Encounters<1>)> {
         let ray = Packet { origin: alone(&origin), direction: alone(&direction), counts: [true] };
         let mut first = Encounters::NONE;
         self.hierarchy.visit(origin, direction, f64::INFINITY, |surface, _| {
@@ -105,7 +98,7 @@ impl Scene {
 
     /// The first surfaces on `rays`, most of which start where `outlook` is from.
     #[inline(always)]
-    fn encounters<const N: usize>(&self, outlook: &Outlook, rays: &Packet<N>) -> Encounters<N> {
+    fn encounters<const N: usize>(&self, outlook: &Outlook, rays: &Packet<f64, N>) -> Encounters<N> {
         let mut first = Encounters::NONE;
         let mut inside = *rays;
         for i in (0..N).filter(|&i| rays.counts[i]) {
@@ -133,31 +126,21 @@ impl Scene {
 
     /// The light along rays with these first encounters, of detail no finer than the `spreads` (radians between neighbouring rays) show.
     #[inline(always)]
-    fn lights<const N: usize>(&self, rays: &Packet<N>, met: &Encounters<N>, spreads: &[f64; N]) -> [Rgb; N] {
+    fn lights<const N: usize>(&self, rays: &Packet<f64, N>, met: &Encounters<N>, spreads: &[f64; N]) -> [Rgb; N] {
         let mut lights = [self.backdrop; N];
         let mut left = rays.counts;
         for (left, surface) in left.iter_mut().zip(&met.surfaces) {
             *left &= *surface != NOTHING;
         }
         while let Some((surface, members)) = next_value(&mut left, &met.surfaces) {
-            let found = self.radiances::<EXACT, N>(surface, (rays, &members), met, spreads);
+            let solid = &self.solids[surface as usize];
+            let points = at_ranges(&rays.origin, &rays.direction, &met.ranges);
+            let positions = turned(&solid.shape_from_world, &less(&points, &solid.centre));
+            let (rays, ranges, normals) = (&Packet { counts: members, ..*rays }, &met.ranges, met.normals);
+            let found = self.radiances(surface, &Contacts { rays, ranges, points, positions, normals }, spreads);
             for i in 0..N {
-                lights[i] = if members[i] { found[i] } else { lights[i] };
+                lights[i] = if members[i] { [found[0][i], found[1][i], found[2][i]] } else { lights[i] };
             }
-        }
-        lights
-    }
-
-    /// The light along those of the rays that count, which meet this surface first by single precision.
-    #[inline(always)]
-    fn glances<const N: usize>(&self, surface: u32, rays: &Packet<N>, spreads: &[f64; N]) -> [Rgb; N] {
-        let mut met = Encounters::NONE;
-        self.solids[surface as usize].take(surface, rays, &mut met);
-        let mut lights = self.radiances::<QUICK, N>(surface, (rays, &rays.counts), &met, spreads);
-        for i in (0..N).filter(|&i| rays.counts[i] && met.surfaces[i] == NOTHING) {
-            // Beside the surface by less than rounding: what is there.
-            let found = self.encounter(one_of(&rays.origin, i), one_of(&rays.direction, i));
-            lights[i] = found.map_or(self.backdrop, |(ray, met)| self.lights(&ray, &met, &[spreads[i]])[0]);
         }
         lights
     }
@@ -167,100 +150,12 @@ impl Scene {
         let boxes = self.solids.iter().map(Solid::turned_box).enumerate();
         Sight::new(&self.solids, Outlook::overlapping(boxes, place, slack, Sight::OVERLAP))
     }
-
-    /// The linear colours where those of the rays that are `members` meet a surface.
-    #[inline(always)]
-    fn radiances<const PRECISION: u8, const N: usize>(
-        &self,
-        surface: u32,
-        (rays, members): (&Packet<N>, &[bool; N]),
-        met: &Encounters<N>,
-        spreads: &[f64; N],
-    ) -> [Rgb; N] {
-        // Texture seen at a slant is compressed; more than this factor would blur it across as well.
-        const MOST_SLANTED: f64 = 0.4;
-        let solid = &self.solids[surface as usize];
-        let points = at_ranges(&rays.origin, &rays.direction, &met.ranges);
-        let normals = turned(&solid.world_from_shape, &met.normals);
-        let slants = dots(&normals, &rays.direction);
-        let mut footprints = [0.0; N];
-        for i in 0..N {
-            footprints[i] = met.ranges[i] * spreads[i] / slants[i].abs().max(MOST_SLANTED);
-        }
-        let positions = turned(&solid.shape_from_world, &less(&points, &solid.centre));
-        let at = solid.shape.surface_points(positions, &met.normals, footprints);
-        let reflectances = solid.material.pattern.reflectances::<PRECISION, N>(&at, solid.material.seed, members);
-        if let Some(glow) = solid.material.glow {
-            return reflectances.map(|reflectance| reflectance.map(|c| c * glow));
-        }
-        let mut lights = self.lighting.ambients(&points, &normals);
-        for (number, lamp) in self.lighting.lamps.iter().enumerate() {
-            let shares = lamp.shares(&points, &normals);
-            let mut lit = *members;
-            for i in 0..N {
-                lit[i] &= shares[i] > 0.0;
-            }
-            if lit.iter().any(|lit| *lit) {
-                let seen = match PRECISION {
-                    EXACT => self.seen(&points, &normals, (lamp.position, &self.shades[number]), &lit),
-                    _ => self.quick_shades[number].reached(&points, surface, &lit),
-                };
-                for i in 0..N {
-                    let more = [0, 1, 2].map(|channel| lights[i][channel] + lamp.power[channel] * shares[i]);
-                    lights[i] = if seen[i] { more } else { lights[i] };
-                }
-            }
-        }
-        for (light, reflectance) in lights.iter_mut().zip(reflectances) {
-            *light = [0, 1, 2].map(|i| reflectance[i] * light[i]);
-        }
-        lights
-    }
-
-    /// Those of the points asked for, on surfaces with `normals`, between which and a lamp nothing stands; `shades` are of the lamp.
-    #[inline(always)]
-    fn seen<const N: usize>(
-        &self,
-        points: &Triples<N>,
-        normals: &Triples<N>,
-        (lamp, shades): (Vector3<f64>, &Outlook),
-        asked: &[bool; N],
-    ) -> [bool; N] {
-        const CLEARANCE_MM: f64 = 1e-3;
-        let mut rays = Packet { origin: *points, direction: *points, counts: *asked };
-        for axis in 0..3 {
-            let rays = rays.origin[axis].iter_mut().zip(&mut rays.direction[axis]);
-            for ((origin, direction), normal) in rays.zip(&normals[axis]) {
-                *origin += normal * CLEARANCE_MM;
-                *direction = lamp[axis] - *origin;
-            }
-        }
-        let distances = dots(&rays.direction, &rays.direction).map(f64::sqrt);
-        let mut from_lamp = rays.direction;
-        from_lamp.as_flattened_mut().iter_mut().for_each(|component| *component = -*component);
-        let cells = shades.cells(&singles(&from_lamp));
-        let mut seen = *asked;
-        let mut candidates = shades.candidates(asked, &cells);
-        while let Some(candidate) = candidates.next() {
-            if f64::from(candidate.from_mm) > largest(&distances, &seen, f64::NEG_INFINITY) {
-                break;
-            }
-            let solid = &self.solids[candidate.shape as usize];
-            let [origin, direction] = solid.own(&rays);
-            let met = solid.shape.meet(&origin, &direction);
-            for (seen, range) in seen.iter_mut().zip(&met.ranges) {
-                let is_between = *range < 1.0;
-                *seen &= !is_between;
-            }
-        }
-        seen
-    }
 }
 
 impl Solid {
     /// Rays in the frame of the shape: where they start, and their directions.
     #[inline(always)]
-    fn own<const N: usize>(&self, rays: &Packet<N>) -> [Triples<N>; 2] {
+    pub fn own<const N: usize>(&self, rays: &Packet<f64, N>) -> [Triples<N>; 2] {
         [
             turned(&self.shape_from_world, &less(&rays.origin, &self.centre)),
             turned(&self.shape_from_world, &rays.direction),
@@ -269,7 +164,7 @@ impl Solid {
 
     /// Puts this solid, of number `surface`, in the place of what those of the rays that count meet farther away.
     #[inline(always)]
-    fn take<const N: usize>(&self, surface: u32, rays: &Packet<N>, first: &mut Encounters<N>) {
+    fn take<const N: usize>(&self, surface: u32, rays: &Packet<f64, N>, first: &mut Encounters<N>) {
         let [origin, direction] = self.own(rays);
         let met = self.shape.meet(&origin, &direction);
         let mut nearer = rays.counts;
@@ -331,7 +226,7 @@ mod tests {
         for round in 0..2000 {
             let towards = vector(1.0).normalize();
             let mut rays =
-                Packet::<LANES> { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], counts: [true; LANES] };
+                Packet::<f64, LANES> { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], counts: [true; LANES] };
             for i in 0..LANES {
                 let (origin, direction) = (place + vector(0.7), (towards + vector(0.02)).normalize());
                 for axis in 0..3 {
