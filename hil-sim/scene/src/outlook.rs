@@ -176,6 +176,11 @@ impl<const N: usize> Candidates<'_, N> {
     #[inline(always)]
     pub fn next(&mut self) -> Option<Candidate> {
         let lists = &mut self.lists[..self.count];
+        if let [list] = lists {
+            let (nearest, rest) = list.split_first()?;
+            *list = rest;
+            return Some(*nearest);
+        }
         let nearest = lists.iter().filter_map(|list| list.first()).copied().min_by(Candidate::order)?;
         for list in lists {
             if let Some((_, rest)) = list.split_first().filter(|(first, _)| first.shape == nearest.shape) {

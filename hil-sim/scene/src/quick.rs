@@ -116,10 +116,10 @@ impl RayTable {
             let (lanes, pixel) = (row * TILE..row * TILE + columns, (y + row) * width + x);
             let from = (y + row + 1) * (width + 2) + x + 1;
             for (rays, component) in rays.iter_mut().zip(&self.rays) {
-                rays[lanes.clone()].copy_from_slice(&component[from..from + columns]);
+                copy_row(&mut rays[lanes.clone()], &component[from..from + columns]);
             }
-            pupils[lanes.clone()].copy_from_slice(&self.pupils[pixel..pixel + columns]);
-            block.spreads[lanes].copy_from_slice(&self.pitches[pixel..pixel + columns]);
+            copy_row(&mut pupils[lanes.clone()], &self.pupils[pixel..pixel + columns]);
+            copy_row(&mut block.spreads[lanes], &self.pitches[pixel..pixel + columns]);
         }
         eyes.aim(&mut block.rays, &rays, &pupils);
     }
@@ -189,13 +189,25 @@ fn glance(
         for (i, level) in levels.iter_mut().enumerate() {
             *level = ((red[i] + green[i] + blue[i]) / 3.0).sqrt();
         }
-        for (row, lanes) in rows[top..].iter_mut().zip((0..QUICK_LANES).step_by(TILE)) {
-            for i in (0..TILE).filter(|i| block.rays.counts[lanes + i]) {
-                let (x, lane) = (left + i, lanes + i);
-                (0..3).for_each(|channel| row.light[channel][x] = block.lights[channel][lane]);
-                (row.levels[x], row.surfaces[x]) = (levels[lane], block.surfaces[lane]);
+        let columns = TILE.min(width - left);
+        for (row, from) in rows[top..].iter_mut().zip((0..QUICK_LANES).step_by(TILE)) {
+            let (lanes, pixels) = (from..from + columns, left..left + columns);
+            // Outside the field there is no light.
+            for (shown, light) in row.light.iter_mut().zip(&block.lights) {
+                copy_row(&mut shown[pixels.clone()], &light[lanes.clone()]);
             }
+            copy_row(&mut row.levels[pixels.clone()], &levels[lanes.clone()]);
+            copy_row(&mut row.surfaces[pixels], &block.surfaces[lanes]);
         }
     }
     bundle.clear();
+}
+
+/// Copies a row of a tile, or what of it is within the image: of a whole one in one instruction.
+#[inline(always)]
+fn copy_row<T: Copy>(to: &mut [T], from: &[T]) {
+    match (to.first_chunk_mut::<TILE>(), from.first_chunk::<TILE>()) {
+        (Some(to), Some(from)) => *to = *from,
+        _ => to.copy_from_slice(from),
+    }
 }

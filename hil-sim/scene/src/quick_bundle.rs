@@ -104,7 +104,9 @@ impl QuickBundle {
         for (number, block) in self.blocks.iter_mut().enumerate() {
             (block.surfaces, block.ranges) = first_many(sight, &block.rays);
             for (lights, backdrop) in block.lights.iter_mut().zip(scene.backdrop) {
-                *lights = [backdrop; QUICK_LANES];
+                for (light, counts) in lights.iter_mut().zip(&block.rays.counts) {
+                    *light = if *counts { backdrop } else { 0.0 };
+                }
             }
             let mut wanted = [false; QUICK_LANES];
             for (wanted, (surface, owner)) in wanted.iter_mut().zip(block.surfaces.iter().zip(&block.owners)) {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::Optics;
 use crate::optics::encoded;
-use crate::packet::{LANES, Singles};
+use crate::packet::{QUICK_LANES, Singles};
 use crate::quick::{Canvas, RayTable};
 use crate::quick_spread::{Spread, SpreadRows};
 use crate::texture_noise::mix;
@@ -33,15 +33,16 @@ pub fn develop(canvas: &Canvas, table: &RayTable, optics: &Optics, noise: u64) -
         for (channel, rows) in spread_rows.iter_mut().enumerate() {
             spread.row(canvas, (channel, y), &table.spots[y * width..], rows);
         }
-        for (part, pixels) in row.chunks_mut(3 * LANES).enumerate() {
-            let (first, count) = (part * LANES, pixels.len() / 3);
-            let mut lights = [[0.0; LANES]; 3];
+        let in_field = &table.rays[2][(y + 1) * (width + 2) + 1..][..width];
+        for (part, pixels) in row.chunks_mut(3 * QUICK_LANES).enumerate() {
+            let (first, count) = (part * QUICK_LANES, pixels.len() / 3);
+            let mut lights = [[0.0; QUICK_LANES]; 3];
             for (lights, rows) in lights.iter_mut().zip(&*spread_rows) {
                 lights[..count].copy_from_slice(&rows.light[first..first + count]);
             }
             let bytes = exposed(&lights, sensor, levels, noise, (y * width + first) as u32);
-            for (i, pixel) in pixels.chunks_exact_mut(3).enumerate().filter(|(i, _)| table.is_seen(first + i, y)) {
-                pixel.copy_from_slice(&[0, 1, 2].map(|channel| bytes[channel][i]));
+            for ((i, pixel), ray) in pixels.chunks_exact_mut(3).enumerate().zip(&in_field[first..]) {
+                pixel.copy_from_slice(if ray.is_nan() { &[0; 3] } else { &bytes[i] });
             }
         }
     });
@@ -50,26 +51,32 @@ pub fn develop(canvas: &Canvas, table: &RayTable, optics: &Optics, noise: u64) -
 
 /// The bytes of pixels side by side, of which the first has this number, by the instructions of this machine: the same on all.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-fn exposed(lights: &Singles<LANES>, sensor: Sensor, levels: &[f32], noise: u64, first: u32) -> [[u8; LANES]; 3] {
+fn exposed(
+    lights: &Singles<QUICK_LANES>,
+    sensor: Sensor,
+    levels: &[f32],
+    noise: u64,
+    first: u32,
+) -> [[u8; 3]; QUICK_LANES] {
     let [read, shot, gain] = sensor;
-    let (mut bytes, mut hashes) = ([[0; LANES]; 3], [0; LANES]);
+    let (mut bytes, mut hashes) = ([[0; 3]; QUICK_LANES], [0; QUICK_LANES]);
     for (hash, number) in hashes.iter_mut().zip(first..) {
         *hash = mix(number ^ noise as u32) ^ (noise >> 32) as u32;
     }
-    for (channel, bytes) in bytes.iter_mut().enumerate() {
-        let (mut steps, mut shown, mut normals) = ([0_u32; LANES], [0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    for (channel, lights) in lights.iter().enumerate() {
+        let (mut steps, mut shown, mut normals) = ([0_u32; QUICK_LANES], [0.0; QUICK_LANES], [0.0; QUICK_LANES]);
+        for i in 0..QUICK_LANES {
             normals[i] = normal(hashes[i], channel as u32);
-            let root = (gain * lights[channel][i]).clamp(0.0, 1.0).sqrt();
+            let root = (gain * lights[i]).clamp(0.0, 1.0).sqrt();
             steps[i] = (root * LEVEL_STEPS as f32 + 0.5) as u32;
         }
-        for i in 0..LANES {
-            shown[i] = levels[steps[i] as usize];
+        for (shown, step) in shown.iter_mut().zip(&steps) {
+            *shown = levels[*step as usize];
         }
-        for i in 0..LANES {
+        for i in 0..QUICK_LANES {
             let sigma = (read * read + shot * shot * shown[i] * (1.0 / 255.0)).sqrt();
             // Adding a half and cutting rounds; below 0 it is 0.
-            bytes[i] = (shown[i] + sigma * normals[i] + 0.5) as u8;
+            bytes[i][channel] = (shown[i] + sigma * normals[i] + 0.5) as u8;
         }
     }
     bytes
