@@ -163,6 +163,7 @@ struct Cells<'a> {
 }
 
 /// What is known of a square of pixels.
+#[allow(clippy::large_enum_variant, reason = "most squares lie inside")]
 enum Square {
     /// Value and derivatives per pixel (u, v, uu, uv, vv) at its middle.
     Inside([Node; 6]),
