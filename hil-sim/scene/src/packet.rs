@@ -9,7 +9,8 @@ use crate::real::Real;
 /// Rays that are followed at once where many are: as many as the largest vector registers hold single precision numbers.
 pub const LANES: usize = 16;
 
-/// The same for images in real time.
+/// The same for images in real time: those of a square of pixels. The compiler unrolls loops over so few as [`LANES`], and then does not always
+/// find the largest registers; and what is done once for all rays side by side counts less.
 pub const QUICK_LANES: usize = 64;
 
 /// Three components of `N` vectors.

@@ -134,6 +134,9 @@ pub fn render_quick(
     seed: u64,
     world_from_camera: &(dyn Fn(u32) -> Transform<World, Camera> + Sync),
 ) -> RgbImage {
+    if table.pitches.is_empty() {
+        return RgbImage::new(table.size.width, table.size.height);
+    }
     let (place, slack) = Rows { at_once: 1, world_from_camera }.reach(view);
     let (sight, lens) = (view.scene.sight(place, slack), view.camera.rays());
     let eyes: Vec<Eye> = (0..table.size.height).into_par_iter().map(|y| Eye::new(&world_from_camera(y))).collect();
@@ -150,8 +153,7 @@ pub fn render_quick(
     for ([x, y], light) in edges.into_iter().flatten() {
         (0..3).for_each(|channel| canvas[y].light[channel][x] = light[channel]);
     }
-    let width = (table.size.width as usize).max(1);
-    canvas.par_iter_mut().zip(table.exposures.par_chunks(width)).for_each(|(row, exposures)| {
+    canvas.par_iter_mut().zip(table.exposures.par_chunks(table.size.width as usize)).for_each(|(row, exposures)| {
         for light in &mut row.light {
             light.iter_mut().zip(exposures).for_each(|(light, exposure)| *light *= exposure);
         }

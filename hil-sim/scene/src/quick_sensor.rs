@@ -28,7 +28,7 @@ pub fn develop(canvas: &Canvas, table: &RayTable, optics: &Optics, noise: u64) -
     let sensor = [optics.read_noise, optics.shot_noise, optics.gain].map(|value| value.max(0.0) as f32);
     let (levels, spread): (&[f32], _) = (&LEVELS, Spread::new(optics.blur_px, &table.spots));
     let mut image = RgbImage::new(table.size.width, table.size.height);
-    let rows = image.par_chunks_exact_mut(3 * width.max(1)).enumerate();
+    let rows = image.par_chunks_exact_mut(3 * width).enumerate();
     rows.for_each_init(<[SpreadRows; 3]>::default, |spread_rows, (y, row)| {
         for (channel, rows) in spread_rows.iter_mut().enumerate() {
             spread.row(canvas, (channel, y), &table.spots[y * width..], rows);
