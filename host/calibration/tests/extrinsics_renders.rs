@@ -19,7 +19,7 @@ use vergence_calibration::{
 };
 use vergence_scene::{Optics, SheetView, Target, photograph_sheet};
 use vergence_targets::{Corner, TargetSpec, TargetView, detect};
-use vergence_vision::{Camera, ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform};
+use vergence_vision::{ImageSize, KannalaBrandt, Length, OpenCvFisheye, Pixel, Transform};
 
 const SPEC: TargetSpec = TargetSpec { columns: COLUMNS, rows: ROWS, square: Length::from_mm(SQUARE_MM) };
 const SHARED_VIEWS: usize = 12;
