@@ -1,4 +1,5 @@
 //! Lenses traced through a published design, in the place of a bench's ideal ones, and how well they are mounted.
+#![allow(dead_code, reason = "each test file uses its own part")]
 
 use vergence_lens::Displacement;
 use vergence_scene::{LensChoice, TrueLens};
