@@ -22,6 +22,7 @@ mod outlook;
 mod packet;
 mod quick;
 mod quick_bundle;
+mod quick_canvas;
 mod quick_edges;
 mod quick_eye;
 mod quick_sensor;

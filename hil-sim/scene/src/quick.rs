@@ -7,13 +7,15 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use image::RgbImage;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use vergence_vision::{Angle, Camera, ImageSize, Transform, World};
 
 use crate::Optics;
 use crate::lens::Lens;
-use crate::packet::QUICK_LANES;
+use crate::packet::{QUICK_LANES, Singles};
 use crate::quick_bundle::{Block, QuickBundle};
+use crate::quick_canvas::{Canvas, CanvasRows};
 use crate::quick_edges::edge_lights;
 use crate::quick_eye::{Eye, TileEyes};
 use crate::quick_sensor::develop;
@@ -21,7 +23,6 @@ use crate::rays::directions_of_all;
 use crate::render::{Rows, View};
 use crate::sight::Sight;
 use crate::texture_noise::mix64;
-use crate::trace::NOTHING;
 
 /// Number of rows that one task renders: some tiles.
 pub const BAND: usize = TILE;
@@ -45,30 +46,6 @@ pub struct RayTable {
     pub(crate) pupils: Vec<f32>,
     /// Of earlier images, to be used again: new memory takes the system a tenth of an image's time.
     canvases: Arc<Mutex<Vec<Canvas>>>,
-}
-
-/// The rows of an image that is being made.
-pub type Canvas = Vec<CanvasRow>;
-
-/// What the rays through the centres of a row of pixels meet.
-#[derive(Clone, Debug)]
-pub struct CanvasRow {
-    /// Red, green and blue; none outside the field.
-    pub light: [Vec<f32>; 3],
-    /// The square root of the mean of the colours.
-    pub levels: Vec<f32>,
-    /// Numbers of the surfaces; [`NOTHING`] where nothing is met, and outside the field.
-    pub surfaces: Vec<u32>,
-}
-
-impl CanvasRow {
-    fn new(width: usize) -> Self {
-        Self {
-            light: [const { Vec::new() }; 3].map(|_: Vec<f32>| vec![0.0; width]),
-            levels: vec![0.0; width],
-            surfaces: vec![NOTHING; width],
-        }
-    }
 }
 
 impl RayTable {
@@ -104,7 +81,7 @@ impl RayTable {
 
     fn canvas(&self) -> Canvas {
         let used = self.canvases.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        used.unwrap_or_else(|| vec![CanvasRow::new(self.size.width as usize); self.size.height as usize])
+        used.unwrap_or_else(|| Canvas::new(self.size.width as usize, self.size.height as usize))
     }
 
     /// The rays of the tile of pixels whose first is (`x`, `y`).
@@ -141,8 +118,8 @@ pub fn render_quick(
     let (sight, lens) = (view.scene.sight(place, slack), view.camera.rays());
     let eyes: Vec<Eye> = (0..table.size.height).into_par_iter().map(|y| Eye::new(&world_from_camera(y))).collect();
     let mut canvas = table.canvas();
-    canvas.par_chunks_mut(BAND).enumerate().for_each_init(QuickBundle::default, |bundle, (band, rows)| {
-        glance(view, table, &sight, bundle, (band * BAND, &eyes[band * BAND..]), rows);
+    canvas.par_bands(BAND).enumerate().for_each_init(QuickBundle::default, |bundle, (band, mut rows)| {
+        glance(view, table, &sight, bundle, (band * BAND, &eyes[band * BAND..]), &mut rows);
     });
     let bands = eyes.par_chunks(BAND).enumerate();
     let edges: Vec<_> = bands
@@ -150,11 +127,9 @@ pub fn render_quick(
             edge_lights((view, table, &lens, seed), &sight, bundle, (&canvas, band * BAND, eyes))
         })
         .collect();
-    for ([x, y], light) in edges.into_iter().flatten() {
-        (0..3).for_each(|channel| canvas[y].light[channel][x] = light[channel]);
-    }
-    canvas.par_iter_mut().zip(table.exposures.par_chunks(table.size.width as usize)).for_each(|(row, exposures)| {
-        for light in &mut row.light {
+    edges.into_iter().flatten().for_each(|(place, light)| canvas.set_light(place, light));
+    canvas.par_bands(1).zip(table.exposures.par_chunks(table.size.width as usize)).for_each(|(mut row, exposures)| {
+        for light in row.rows(0).flat_map(|row| row.light) {
             light.iter_mut().zip(exposures).for_each(|(light, exposure)| *light *= exposure);
         }
     });
@@ -170,10 +145,10 @@ fn glance(
     sight: &Sight,
     bundle: &mut QuickBundle,
     (top, eyes): (usize, &[Eye]),
-    rows: &mut [CanvasRow],
+    rows: &mut CanvasRows<'_>,
 ) {
     let width = table.size.width as usize;
-    for (y, of_rows) in (0..rows.len()).step_by(TILE).zip(eyes.chunks(TILE)) {
+    for (y, of_rows) in (0..rows.height()).step_by(TILE).zip(eyes.chunks(TILE)) {
         let eyes = TileEyes::new(of_rows);
         for x in (0..width).step_by(TILE) {
             let block = bundle.add_block();
@@ -187,15 +162,12 @@ fn glance(
     bundle.follow(view.scene, sight, |_, _| true);
     for block in bundle.blocks() {
         let [left, top] = [block.owners[0] as usize % width, block.owners[0] as usize / width];
-        let ([red, green, blue], mut levels) = (&block.lights, [0.0; QUICK_LANES]);
-        for (i, level) in levels.iter_mut().enumerate() {
-            *level = ((red[i] + green[i] + blue[i]) / 3.0).sqrt();
-        }
+        let levels = levels(&block.lights);
         let columns = TILE.min(width - left);
-        for (row, from) in rows[top..].iter_mut().zip((0..QUICK_LANES).step_by(TILE)) {
+        for (row, from) in rows.rows(top).zip((0..QUICK_LANES).step_by(TILE)) {
             let (lanes, pixels) = (from..from + columns, left..left + columns);
             // Outside the field there is no light.
-            for (shown, light) in row.light.iter_mut().zip(&block.lights) {
+            for (shown, light) in row.light.into_iter().zip(&block.lights) {
                 copy_row(&mut shown[pixels.clone()], &light[lanes.clone()]);
             }
             copy_row(&mut row.levels[pixels.clone()], &levels[lanes.clone()]);
@@ -203,6 +175,16 @@ fn glance(
         }
     }
     bundle.clear();
+}
+
+/// The square roots of the means of colours, by the instructions of this machine: the same numbers on all.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
+fn levels(lights: &Singles<QUICK_LANES>) -> [f32; QUICK_LANES] {
+    let ([red, green, blue], mut levels) = (lights, [0.0; QUICK_LANES]);
+    for i in 0..QUICK_LANES {
+        levels[i] = ((red[i] + green[i] + blue[i]) / 3.0).sqrt();
+    }
+    levels
 }
 
 /// Copies a row of a tile, or what of it is within the image: of a whole one in one instruction.

@@ -11,8 +11,10 @@ use crate::trace::NOTHING;
 /// Rays in the order in which they were gathered.
 #[derive(Debug, Default)]
 pub struct QuickBundle {
+    /// Those in use, and then others that are there to be used again.
     blocks: Vec<Block>,
-    /// Those of the last block.
+    used: usize,
+    /// Rays of the last block in use.
     in_last: usize,
 }
 
@@ -64,11 +66,11 @@ impl Block {
 impl QuickBundle {
     /// Adds a ray of a pixel, in the world.
     pub fn push(&mut self, owner: usize, origin: [f32; 3], direction: [f32; 3], spread: f32) {
-        if self.blocks.is_empty() || self.in_last == QUICK_LANES {
+        if self.used == 0 || self.in_last == QUICK_LANES {
             self.add_block();
             self.in_last = 0;
         }
-        let (Some(block), at) = (self.blocks.last_mut(), self.in_last) else { return };
+        let (block, at) = (&mut self.blocks[self.used - 1], self.in_last);
         for axis in 0..3 {
             (block.rays.origin[axis][at], block.rays.direction[axis][at]) = (origin[axis], direction[axis]);
         }
@@ -76,32 +78,37 @@ impl QuickBundle {
         self.in_last += 1;
     }
 
-    /// Adds rays that are side by side, and which the caller sets.
+    /// Adds rays that are side by side, and which the caller sets: those that do not count have any numbers.
     pub fn add_block(&mut self) -> &mut Block {
-        self.in_last = QUICK_LANES;
-        self.blocks.push_mut(Block::EMPTY)
+        if self.used == self.blocks.len() {
+            self.blocks.push(Block::EMPTY);
+        }
+        (self.used, self.in_last) = (self.used + 1, QUICK_LANES);
+        let block = &mut self.blocks[self.used - 1];
+        block.rays.counts = [false; QUICK_LANES];
+        block
     }
 
     /// Takes the last block away.
-    pub fn drop_block(&mut self) {
-        self.blocks.pop();
+    pub const fn drop_block(&mut self) {
+        self.used -= 1;
     }
 
     /// What is in the bundle.
     pub fn blocks(&self) -> &[Block] {
-        &self.blocks
+        &self.blocks[..self.used]
     }
 
     /// Takes all rays away.
-    pub fn clear(&mut self) {
-        self.blocks.clear();
+    pub const fn clear(&mut self) {
+        self.used = 0;
     }
 
     /// Follows the rays, and notes in the blocks what they found. `wants_light(owner, surface)` tells whether a ray that meets this surface
     /// needs its light, which takes most of the time.
     pub fn follow(&mut self, scene: &Scene, sight: &Sight, wants_light: impl Fn(usize, u32) -> bool) {
         let mut alone = Vec::new();
-        for (number, block) in self.blocks.iter_mut().enumerate() {
+        for (number, block) in self.blocks[..self.used].iter_mut().enumerate() {
             (block.surfaces, block.ranges) = first_many(sight, &block.rays);
             for (lights, backdrop) in block.lights.iter_mut().zip(scene.backdrop) {
                 for (light, counts) in lights.iter_mut().zip(&block.rays.counts) {

@@ -4,8 +4,9 @@ use multiversion::multiversion;
 
 use crate::lens::LensRays;
 use crate::optics::unit_pair;
-use crate::quick::{BAND, Canvas, CanvasRow, RayTable, TILE};
+use crate::quick::{BAND, RayTable, TILE};
 use crate::quick_bundle::QuickBundle;
+use crate::quick_canvas::Canvas;
 use crate::quick_eye::Eye;
 use crate::render::View;
 use crate::sight::Sight;
@@ -38,14 +39,13 @@ struct Edge {
 
 impl Edge {
     fn new(canvas: &Canvas, [x, y]: [usize; 2], is_within: bool, rays: u32) -> Self {
-        let [last_row, last] = [canvas.len() - 1, canvas[y].surfaces.len() - 1];
+        let [last_row, last] = [canvas.height() - 1, canvas.width() - 1];
         let [above, below, left, right] =
             [y.saturating_sub(1), (y + 1).min(last_row), x.saturating_sub(1), (x + 1).min(last)];
         let (mut surfaces, mut lights) = ([NOTHING; 5], [[0.0; 3]; 5]);
         for (number, [x, y]) in [[x, y], [left, y], [right, y], [x, above], [x, below]].into_iter().enumerate() {
-            let CanvasRow { light: [red, green, blue], surfaces: shown, .. } = &canvas[y];
-            lights[number] = [red[x], green[x], blue[x]];
-            surfaces[number] = if is_within { NOTHING } else { shown[x] };
+            lights[number] = canvas.light_at([x, y]);
+            surfaces[number] = if is_within { NOTHING } else { canvas.surfaces(y)[x] };
         }
         Self { place: [x, y], surfaces, lights, sum: lights[0], count: rays as f32 + 1.0 }
     }
@@ -138,35 +138,34 @@ impl RayTable {
         };
         let (at, du, dv) = (ray(middle), slope(middle - 1, middle + 1), slope(middle - stride, middle + stride));
         let at_rim = du[0].is_nan() || dv[0].is_nan();
+        if at_rim {
+            let pixels: Vec<_> = places.map(|[u, v]| [x as f64 + f64::from(u), y as f64 + f64::from(v)]).collect();
+            let exact = lens.directions(&pixels).into_iter().filter(|ray| !ray[2].is_nan());
+            exact.for_each(|ray| visit(eye.in_world(ray.map(|component| component as f32))));
+            return;
+        }
         for [u, v] in places {
-            if at_rim {
-                let exact = lens.directions(&[[x as f64 + f64::from(u), y as f64 + f64::from(v)]]);
-                let exact = exact.first().filter(|ray| !ray[2].is_nan());
-                exact.into_iter().for_each(|[x, y, z]| visit(eye.in_world([*x as f32, *y as f32, *z as f32])));
-            } else {
-                let along = |axis: usize| at[axis] + du[axis] * u + dv[axis] * v;
-                visit([along(0), along(1), along(2)]);
-            }
+            let along = |axis: usize| at[axis] + du[axis] * u + dv[axis] * v;
+            visit([along(0), along(1), along(2)]);
         }
     }
 }
 
 /// The marks of the pixels of a row.
 fn marks(canvas: &Canvas, y: usize) -> Vec<u8> {
-    let here = &canvas[y];
-    let mut marks = vec![0; here.surfaces.len()];
-    for other in [y.saturating_sub(1), (y + 1).min(canvas.len() - 1)] {
-        mark(&mut marks, [here, &canvas[other]], [0, 0]);
+    let mut marks = vec![0; canvas.width()];
+    for other in [y.saturating_sub(1), (y + 1).min(canvas.height() - 1)] {
+        mark(&mut marks, canvas, [y, other], [0, 0]);
     }
-    mark(&mut marks[1..], [here, here], [1, 0]);
-    mark(&mut marks, [here, here], [0, 1]);
+    mark(&mut marks[1..], canvas, [y, y], [1, 0]);
+    mark(&mut marks, canvas, [y, y], [0, 1]);
     marks
 }
 
 /// Marks the pixels of one row from column `from[0]` on, by those of another from column `from[1]` on.
-fn mark(marks: &mut [u8], [here, other]: [&CanvasRow; 2], from: [usize; 2]) {
-    let surfaces = [&here.surfaces[from[0]..], &other.surfaces[from[1]..]];
-    mark_many(marks, surfaces, [&here.levels[from[0]..], &other.levels[from[1]..]]);
+fn mark(marks: &mut [u8], canvas: &Canvas, [here, other]: [usize; 2], from: [usize; 2]) {
+    let surfaces = [&canvas.surfaces(here)[from[0]..], &canvas.surfaces(other)[from[1]..]];
+    mark_many(marks, surfaces, [&canvas.levels(here)[from[0]..], &canvas.levels(other)[from[1]..]]);
 }
 
 /// Marks pixels by others, as far as there are any, by the instructions of this machine: the same on all.

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use crate::Optics;
 use crate::optics::encoded;
 use crate::packet::{QUICK_LANES, Singles};
-use crate::quick::{Canvas, RayTable};
+use crate::quick::RayTable;
+use crate::quick_canvas::Canvas;
 use crate::quick_spread::{Spread, SpreadRows};
 use crate::texture_noise::mix;
 

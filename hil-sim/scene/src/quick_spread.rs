@@ -1,7 +1,7 @@
 //! The lens's point spread, applied to an image row by row, for images in real time.
 
 use crate::blur::{SPOT_STEPS, add_numbers, discrete_gaussian, extremes};
-use crate::quick::Canvas;
+use crate::quick_canvas::Canvas;
 
 /// The weights of [`spread`](crate::blur::spread).
 pub struct Spread {
@@ -48,14 +48,14 @@ pub struct SpreadRows {
 impl Spread {
     /// One channel of row `y` with each pixel spread over its neighbours, as the `spots` of that row say. Beyond the image there is no light.
     pub fn row(&self, canvas: &Canvas, (channel, y): (usize, usize), spots: &[f32], rows: &mut SpreadRows) {
-        let row = |y: usize| &canvas[y].light[channel];
+        let row = |y: usize| canvas.light(channel, y);
         let SpreadRows { down, both, light } = rows;
         clear(light, row(y).len());
         for SpreadStep { weights, spot } in &self.steps {
             clear(down, light.len());
             add_numbers(down, weights[0], row(y));
             for (distance, &weight) in weights.iter().enumerate().skip(1) {
-                let sides = [y.checked_sub(distance), Some(y + distance).filter(|&y| y < canvas.len())];
+                let sides = [y.checked_sub(distance), Some(y + distance).filter(|&y| y < canvas.height())];
                 sides.into_iter().flatten().for_each(|y| add_numbers(down, weight, row(y)));
             }
             clear(both, light.len());
