@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use vergence_rig::{Chain, Rig, RigPose, Screw};
-use vergence_vision::{Base, Frame, Transform};
+use vergence_vision::{Base, Frame, Left, Right, Transform};
 
 /// A rail that is bent to a parabola between the ends of an axis's range, where it is as drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,10 +17,15 @@ impl BentRail {
     /// The pose of `rig` with its axes at `values` (millimetres or radians), with this rail; uncertain as the straight rig.
     #[must_use]
     pub fn pose(&self, rig: &Rig, values: &[f64]) -> RigPose {
+        let (base_from_left, left_from_right) = self.cameras(rig, values);
+        RigPose { base_from_left, left_from_right, ..rig.pose_at_values(values) }
+    }
+
+    /// The poses of both cameras in it.
+    pub(crate) fn cameras(&self, rig: &Rig, values: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
         let base_from_left = self.base_from_camera(rig, &rig.left_chain, values);
         let base_from_right = self.base_from_camera(rig, &rig.right_chain, values);
-        let left_from_right = base_from_left.inverse() * base_from_right;
-        RigPose { base_from_left, left_from_right, ..rig.pose_at_values(values) }
+        (base_from_left, base_from_left.inverse() * base_from_right)
     }
 
     fn base_from_camera<C: Frame>(&self, rig: &Rig, chain: &Chain<C>, values: &[f64]) -> Transform<Base, C> {
@@ -52,7 +57,7 @@ impl BentRail {
 mod tests {
     #![allow(clippy::expect_used, reason = "a test fails loudly")]
 
-    use vergence_vision::{Left, Point, Right, UnitRay, pseudo_intersection};
+    use vergence_vision::{Point, UnitRay, pseudo_intersection};
 
     use super::*;
     use crate::SimulatedRig;

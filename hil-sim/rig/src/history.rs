@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use vergence_protocol::Microseconds;
 use vergence_rig::linkage::TrunkJoint;
 use vergence_rig::{AxisPosition, Rig, RigPose, RigTrunk};
-use vergence_vision::{Angle, Length, SharedCovariance};
+use vergence_vision::{Angle, Base, Left, Length, Right, SharedCovariance, Transform};
 
 use crate::BentRail;
 
@@ -48,13 +48,26 @@ impl LoadHistory {
     /// largest acceleration the error is below 0.1 um. `None` where nothing is kept.
     #[must_use]
     pub fn pose_at(&self, rig: &Rig, us: f64) -> Option<RigPose> {
+        Some(self.pose_of(rig, &self.loads_at(us)?))
+    }
+
+    /// The poses of both cameras in it: all that an image needs, which has one for each row.
+    pub(crate) fn cameras_at(&self, rig: &Rig, us: f64) -> Option<(Transform<Base, Left>, Transform<Left, Right>)> {
+        let loads = self.loads_at(us)?;
+        if let Some(trunk) = &rig.trunk {
+            let (base_from_left, base_from_right) = trunk.cameras_of(&joints(&loads));
+            return Some((base_from_left, base_from_left.inverse() * base_from_right));
+        }
+        let values = values(rig, &loads);
+        Some(self.rail.map_or_else(|| rig.cameras_at_values(&values), |rail| rail.cameras(rig, &values)))
+    }
+
+    fn loads_at(&self, us: f64) -> Option<Vec<f64>> {
         let next = self.ticks.partition_point(|(at, _)| *at < us);
         let (to, after) = self.ticks.get(next).or(self.ticks.back())?;
         let (from, before) = self.ticks.get(next.saturating_sub(1))?;
         let share = if to > from { ((us - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
-        let loads: Vec<f64> =
-            before.iter().zip(after).map(|(before, after)| before + share * (after - before)).collect();
-        Some(self.pose_of(rig, &loads))
+        Some(before.iter().zip(after).map(|(before, after)| before + share * (after - before)).collect())
     }
 
     /// True pose of `rig` with its loads at these positions, in micro-units, or the joints of its trunk at these angles.
@@ -62,7 +75,7 @@ impl LoadHistory {
         if let Some(trunk) = &rig.trunk {
             return true_pose(rig, trunk, loads);
         }
-        let values: Vec<f64> = rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect();
+        let values = values(rig, loads);
         match self.rail {
             Some(rail) => rail.pose(rig, &values),
             None => rig.pose_at_values(&values),
@@ -70,9 +83,19 @@ impl LoadHistory {
     }
 }
 
+/// The values of the axes with their loads at these positions, in micro-units.
+fn values(rig: &Rig, loads: &[f64]) -> Vec<f64> {
+    rig.axes.iter().zip(loads).map(|(axis, &load)| axis.value_from_micro(load)).collect()
+}
+
+/// The angles of all joints of a trunk's loop.
+fn joints(angles: &[f64]) -> [f64; TrunkJoint::COUNT] {
+    std::array::from_fn(|joint| angles.get(joint).copied().unwrap_or_default())
+}
+
 /// True pose of a trunk with the joints of its loop at these angles.
 fn true_pose(rig: &Rig, trunk: &RigTrunk, angles: &[f64]) -> RigPose {
-    let angles: [f64; TrunkJoint::COUNT] = std::array::from_fn(|joint| angles.get(joint).copied().unwrap_or_default());
+    let angles = joints(angles);
     let (base_from_left, base_from_right) = trunk.cameras_of(&angles);
     let mut values = vec![PI; rig.axes.len()];
     for (joint, axis) in TrunkJoint::DRIVEN.into_iter().zip(trunk.axes) {

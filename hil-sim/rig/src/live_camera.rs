@@ -142,9 +142,9 @@ impl LiveCamera {
         Box::new(move || {
             let at_row = |row: u32| {
                 let at = middle + (f64::from(row) - 0.5 * (rows - 1.0)) * line_us;
-                motion.pose_at(&built, at).map_or_else(
+                motion.cameras_at(&built, at).map_or_else(
                     || camera.room.world_from_base.renamed(),
-                    |pose| camera.room.world_from_camera(camera.side, &pose),
+                    |cameras| camera.room.world_from(camera.side, cameras),
                 )
             };
             Ok(match rendering {

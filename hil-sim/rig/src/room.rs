@@ -6,7 +6,7 @@ use image::RgbImage;
 use nalgebra::{UnitQuaternion, Vector3};
 use vergence_rig::RigPose;
 use vergence_scene::{Lens, Optics, RayTable, Scene, View, render, render_quick, render_rolling};
-use vergence_vision::{Base, Camera, KannalaBrandt, Left, Length, Pixel, Side, Transform, World};
+use vergence_vision::{Base, Camera, KannalaBrandt, Left, Length, Pixel, Right, Side, Transform, World};
 
 /// A furnished room with the rig in it.
 #[derive(Clone, Debug)]
@@ -34,10 +34,19 @@ impl Room {
     /// Pose in the room of the camera on `side` of a rig.
     #[must_use]
     pub fn world_from_camera(&self, side: Side, pose: &RigPose) -> Transform<World, Camera> {
-        let world_from_left = self.world_from_left(pose.base_from_left);
+        self.world_from(side, (pose.base_from_left, pose.left_from_right))
+    }
+
+    /// The same with the cameras at these poses.
+    pub(crate) fn world_from(
+        &self,
+        side: Side,
+        (base_from_left, left_from_right): (Transform<Base, Left>, Transform<Left, Right>),
+    ) -> Transform<World, Camera> {
+        let world_from_left = self.world_from_left(base_from_left);
         match side {
             Side::Left => world_from_left.renamed(),
-            Side::Right => (world_from_left * pose.left_from_right).renamed(),
+            Side::Right => (world_from_left * left_from_right).renamed(),
         }
     }
 }

@@ -25,6 +25,7 @@ mod quick_bundle;
 mod quick_canvas;
 mod quick_edges;
 mod quick_eye;
+mod quick_glance;
 mod quick_sensor;
 mod quick_spread;
 mod radiance;

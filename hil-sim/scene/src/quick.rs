@@ -2,6 +2,7 @@
 //!
 //! Of each pixel one ray is cast, through its centre, and a texture is faded to the size of the pixel; some more rays are cast where that
 //! ray or a neighbour's meets something else, or another light. A ray that meets what a neighbour shows takes the neighbour's light. What depends on lens and pixel alone is computed once, in a [`RayTable`].
+//! What the rays through the centres meet is kept while neither the camera nor what it sees moves: then only noise and edges are new.
 //! Nothing is displaced from where [`render`](crate::render) shows it: places on a pixel's square are symmetric about its centre.
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -18,10 +19,12 @@ use crate::quick_bundle::{Block, QuickBundle};
 use crate::quick_canvas::{Canvas, CanvasRows};
 use crate::quick_edges::edge_lights;
 use crate::quick_eye::{Eye, TileEyes};
+use crate::quick_glance::Glance;
 use crate::quick_sensor::develop;
 use crate::rays::directions_of_all;
 use crate::render::{Rows, View};
 use crate::sight::Sight;
+use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 
 /// Number of rows that one task renders: some tiles.
@@ -39,13 +42,13 @@ pub struct RayTable {
     /// Of the pixels: radians from one to the next.
     pub(crate) pitches: Vec<f32>,
     /// The share of the light that passes the lens.
-    exposures: Vec<f32>,
+    pub(crate) exposures: Vec<f32>,
     /// Variance of the lens's own spot, in square pixels.
     pub(crate) spots: Vec<f32>,
     /// How far along the axis from the camera's origin light crosses it, mm.
     pub(crate) pupils: Vec<f32>,
-    /// Of earlier images, to be used again: new memory takes the system a tenth of an image's time.
-    canvases: Arc<Mutex<Vec<Canvas>>>,
+    /// Of earlier images: what the next one shows too, or at least its memory, since new memory takes the system a tenth of an image's time.
+    kept: Arc<Mutex<Vec<Glance>>>,
 }
 
 impl RayTable {
@@ -70,18 +73,13 @@ impl RayTable {
             exposures: of_each(&|theta| optics.light_at(theta, lens)),
             spots: of_each(&|theta| lens.spot_variance(theta)),
             pupils: of_each(&|theta| lens.pupil(theta).map_or(0.0, |shift| shift.mm())),
-            canvases: Arc::default(),
+            kept: Arc::default(),
         }
     }
 
     /// Whether a pixel is within the field.
     pub(crate) fn is_seen(&self, x: usize, y: usize) -> bool {
         !self.rays[2][(y + 1) * (self.size.width as usize + 2) + x + 1].is_nan()
-    }
-
-    fn canvas(&self) -> Canvas {
-        let used = self.canvases.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        used.unwrap_or_else(|| Canvas::new(self.size.width as usize, self.size.height as usize))
     }
 
     /// The rays of the tile of pixels whose first is (`x`, `y`).
@@ -114,32 +112,51 @@ pub fn render_quick(
     if table.pitches.is_empty() {
         return RgbImage::new(table.size.width, table.size.height);
     }
-    let (place, slack) = Rows { at_once: 1, world_from_camera }.reach(view);
-    let (sight, lens) = (view.scene.sight(place, slack), view.camera.rays());
-    let eyes: Vec<Eye> = (0..table.size.height).into_par_iter().map(|y| Eye::new(&world_from_camera(y))).collect();
-    let mut canvas = table.canvas();
-    canvas.par_bands(BAND).enumerate().for_each_init(QuickBundle::default, |bundle, (band, mut rows)| {
-        glance(view, table, &sight, bundle, (band * BAND, &eyes[band * BAND..]), &mut rows);
-    });
+    let poses: Vec<_> = (0..table.size.height).into_par_iter().map(world_from_camera).collect();
+    let (eyes, lens): (Vec<Eye>, _) = (poses.iter().map(Eye::new).collect(), view.camera.rays());
+    let kept = table.kept.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    let mut glance = match kept {
+        Some(glance) if glance.is_of(view.scene, &poses) => glance,
+        other => looked(view, table, other.map(|other| other.canvas), poses, &eyes),
+    };
+    let Glance { canvas, sight, .. } = &mut glance;
     let bands = eyes.par_chunks(BAND).enumerate();
-    let edges: Vec<_> = bands
+    let mut edges: Vec<_> = bands
         .map_init(QuickBundle::default, |bundle, (band, eyes)| {
-            edge_lights((view, table, &lens, seed), &sight, bundle, (&canvas, band * BAND, eyes))
+            edge_lights((view, table, &lens, seed), sight, bundle, (canvas, band * BAND, eyes))
         })
         .collect();
-    edges.into_iter().flatten().for_each(|(place, light)| canvas.set_light(place, light));
-    canvas.par_bands(1).zip(table.exposures.par_chunks(table.size.width as usize)).for_each(|(mut row, exposures)| {
-        for light in row.rows(0).flat_map(|row| row.light) {
-            light.iter_mut().zip(exposures).for_each(|(light, exposure)| *light *= exposure);
-        }
-    });
-    let image = develop(&canvas, table, view.optics, !mix64(seed));
-    table.canvases.lock().unwrap_or_else(PoisonError::into_inner).push(canvas);
+    let swap = |canvas: &mut Canvas, (place, light): &mut ([usize; 2], Rgb)| canvas.swap_light(*place, light);
+    edges.iter_mut().flatten().for_each(|edge| swap(canvas, edge));
+    let image = develop(canvas, table, view.optics, !mix64(seed));
+    // Each image has its own rays at edges.
+    edges.iter_mut().flatten().for_each(|edge| swap(canvas, edge));
+    table.kept.lock().unwrap_or_else(PoisonError::into_inner).push(glance);
     image
 }
 
+/// What the rays through the centres of the pixels meet from these poses of the rows, which `eyes` are of; on a `used` canvas of the table if
+/// there is one.
+fn looked(
+    view: &View<'_>,
+    table: &RayTable,
+    used: Option<Canvas>,
+    poses: Vec<Transform<World, Camera>>,
+    eyes: &[Eye],
+) -> Glance {
+    let world_from_camera = |row: u32| poses[row as usize];
+    let (place, slack) = Rows { at_once: 1, world_from_camera: &world_from_camera }.reach(view);
+    let sight = view.scene.sight(place, slack);
+    let size = table.size;
+    let mut canvas = used.unwrap_or_else(|| Canvas::new(size.width as usize, size.height as usize));
+    canvas.par_bands(BAND).enumerate().for_each_init(QuickBundle::default, |bundle, (band, mut rows)| {
+        look(view, table, &sight, bundle, (band * BAND, &eyes[band * BAND..]), &mut rows);
+    });
+    Glance::new(canvas, sight, view.scene, poses)
+}
+
 /// What the rays through the centres of the pixels of some rows meet, of which the first is row `top`.
-fn glance(
+fn look(
     view: &View<'_>,
     table: &RayTable,
     sight: &Sight,

@@ -80,10 +80,10 @@ impl Canvas {
         [self.planes[at], self.planes[at + width], self.planes[at + 2 * width]]
     }
 
-    /// Changes the light of a pixel, and neither level nor surface.
-    pub fn set_light(&mut self, [x, y]: [usize; 2], light: Rgb) {
-        for (channel, light) in light.into_iter().enumerate() {
-            self.planes[(PLANES * y + channel) * self.width + x] = light;
+    /// Exchanges the light of a pixel for another, and neither its level nor its surface.
+    pub fn swap_light(&mut self, [x, y]: [usize; 2], light: &mut Rgb) {
+        for (channel, light) in light.iter_mut().enumerate() {
+            std::mem::swap(&mut self.planes[(PLANES * y + channel) * self.width + x], light);
         }
     }
 

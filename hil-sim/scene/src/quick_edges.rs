@@ -76,10 +76,7 @@ pub fn edge_lights(
     let width = table.size.width as usize;
     let mut edges = Vec::new();
     let marks: Vec<Vec<u8>> = (top..top + eyes.len()).map(|y| marks(canvas, y)).collect();
-    for [x, y] in tiled(width, eyes.len()) {
-        if marks[y][x] == 0 || !table.is_seen(x, top + y) {
-            continue;
-        }
+    for [x, y] in marked(&marks).filter(|&[x, y]| table.is_seen(x, top + y)) {
         let (is_within, at) = (marks[y][x] & WITHIN != 0, (top + y) * width + x);
         let (rays, origin) = (EDGE_RAYS[usize::from(is_within)], eyes[y].pupil(table.pupils[at]));
         // A ray outside the field brings no light.
@@ -109,12 +106,18 @@ fn lattice(count: u32, hash: u64) -> impl Iterator<Item = [f32; 2]> {
     std::iter::successors(Some([a as f32, b as f32]), next).take(count as usize).map(|[u, v]| [u - 0.5, v - 0.5])
 }
 
-/// The places (x, y) of a band of so many columns and rows, tile by tile.
-fn tiled(columns: usize, rows: usize) -> impl Iterator<Item = [usize; 2]> {
+/// The places (x, y) of the marks of a band's rows, tile by tile.
+fn marked(marks: &[Vec<u8>]) -> impl Iterator<Item = [usize; 2]> {
+    let (columns, rows) = (marks.first().map_or(0, Vec::len), marks.len());
     let tops = (0..rows).step_by(TILE).flat_map(move |top| (0..columns).step_by(TILE).map(move |left| [left, top]));
     tops.flat_map(move |[left, top]| {
-        let of_tile = move |y| (left..(left + TILE).min(columns)).map(move |x| [x, y]);
-        (top..(top + TILE).min(rows)).flat_map(of_tile)
+        let of_row = move |y: usize| {
+            let part = &marks[y][left..(left + TILE).min(columns)];
+            // Most rows of tiles have none.
+            let part = if *part == [0; TILE] { &[] } else { part };
+            part.iter().enumerate().filter(|(_, mark)| **mark != 0).map(move |(i, _)| [left + i, y])
+        };
+        (top..(top + TILE).min(rows)).flat_map(of_row)
     })
 }
 

@@ -32,7 +32,7 @@ pub fn develop(canvas: &Canvas, table: &RayTable, optics: &Optics, noise: u64) -
     let rows = image.par_chunks_exact_mut(3 * width).enumerate();
     rows.for_each_init(<[SpreadRows; 3]>::default, |spread_rows, (y, row)| {
         for (channel, rows) in spread_rows.iter_mut().enumerate() {
-            spread.row(canvas, (channel, y), &table.spots[y * width..], rows);
+            spread.row((canvas, &table.exposures), (channel, y), &table.spots[y * width..], rows);
         }
         let in_field = &table.rays[2][(y + 1) * (width + 2) + 1..][..width];
         for (part, pixels) in row.chunks_mut(3 * QUICK_LANES).enumerate() {

@@ -1,5 +1,7 @@
 //! The lens's point spread, applied to an image row by row, for images in real time.
 
+use multiversion::multiversion;
+
 use crate::blur::{SPOT_STEPS, add_numbers, discrete_gaussian, extremes};
 use crate::quick_canvas::Canvas;
 
@@ -46,17 +48,24 @@ pub struct SpreadRows {
 }
 
 impl Spread {
-    /// One channel of row `y` with each pixel spread over its neighbours, as the `spots` of that row say. Beyond the image there is no light.
-    pub fn row(&self, canvas: &Canvas, (channel, y): (usize, usize), spots: &[f32], rows: &mut SpreadRows) {
-        let row = |y: usize| canvas.light(channel, y);
+    /// One channel of row `y` of an image that is exposed like this, with each pixel spread over its neighbours, as the `spots` of that row say.
+    /// Beyond the image there is no light.
+    pub fn row(
+        &self,
+        (canvas, exposures): (&Canvas, &[f32]),
+        (channel, y): (usize, usize),
+        spots: &[f32],
+        rows: &mut SpreadRows,
+    ) {
+        let row = |y: usize| (canvas.light(channel, y), &exposures[y * canvas.width()..]);
         let SpreadRows { down, both, light } = rows;
-        clear(light, row(y).len());
+        clear(light, canvas.width());
         for SpreadStep { weights, spot } in &self.steps {
             clear(down, light.len());
-            add_numbers(down, weights[0], row(y));
+            add_exposed(down, weights[0], row(y));
             for (distance, &weight) in weights.iter().enumerate().skip(1) {
                 let sides = [y.checked_sub(distance), Some(y + distance).filter(|&y| y < canvas.height())];
-                sides.into_iter().flatten().for_each(|y| add_numbers(down, weight, row(y)));
+                sides.into_iter().flatten().for_each(|y| add_exposed(down, weight, row(y)));
             }
             clear(both, light.len());
             add_numbers(both, weights[0], down);
@@ -76,6 +85,16 @@ impl Spread {
 fn clear(row: &mut Vec<f32>, width: usize) {
     row.clear();
     row.resize(width, 0.0);
+}
+
+/// Adds a row times `weight`, each number by its exposure, by the instructions of this machine: the same numbers on all.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
+fn add_exposed(sum: &mut [f32], weight: f32, (row, exposures): (&[f32], &[f32])) {
+    let count = sum.len().min(row.len()).min(exposures.len());
+    let (sum, row, exposures) = (&mut sum[..count], &row[..count], &exposures[..count]);
+    for i in 0..count {
+        sum[i] += weight * (row[i] * exposures[i]);
+    }
 }
 
 /// Adds light that is spread by one Gaussian, as much of it as the pixels' spots are of this one.

@@ -1,13 +1,14 @@
 //! Measurement while the stages move, where every row of both images has its own pose.
 
 use vergence_vision::{
-    Angle, Base, Cloud, CloudPoint, DropReason, Gates, Left, MatchSigma, PixelPair, StereoPair, Transform, cloud_point,
+    Angle, Base, Cloud, CloudPoint, DropReason, Gates, Left, MatchSigma, PixelPair, SharedCovariance, StereoPair,
+    Transform, cloud_point,
 };
 
 use crate::exposure::PairExposure;
 use crate::pose::RigPose;
 use crate::rig::Rig;
-use crate::track::{Joints, TrackGap};
+use crate::track::{Joints, JointsAt, TrackGap};
 
 /// The pose of the cameras at the exposure of the middle rows of a pair.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,17 +52,34 @@ pub fn moving_cloud<S: Copy + Into<MatchSigma>>(
 ) -> Result<Cloud, TrackGap> {
     let reference_from_base = rig.pose(&joints.at(exposure.left.middle)?).base_from_left.inverse();
     let calibration = rig.calibration_at(&joints.at(exposure.left.middle)?, &joints.at(exposure.right.middle)?);
-    let mut cloud = Cloud::default();
+    let (mut cloud, mut of_rows) = (Cloud::default(), None::<OfRows>);
     for (pair_index, (pixels, sigma)) in pairs.iter().enumerate() {
-        let left = joints.at(exposure.left.at_row(pixels.left.v))?;
-        let right = joints.at(exposure.right.at_row(pixels.right.v))?;
-        let pose = rig.pose_of_rows(&left, &right, &calibration);
-        match point((pixels, (*sigma).into()), rig, &reference_from_base, &pose, gates) {
+        let at = [joints.at(exposure.left.at_row(pixels.left.v))?, joints.at(exposure.right.at_row(pixels.right.v))?];
+        // While the axes stand, one pose is that of all rows.
+        if of_rows.as_ref().is_none_or(|last| last.joints != at) {
+            of_rows = Some(OfRows::new(at, rig, &calibration, gates));
+        }
+        let Some(OfRows { pose, gates, .. }) = &of_rows else { continue };
+        match point((pixels, (*sigma).into()), rig, &reference_from_base, pose, gates) {
             Ok(point) => cloud.points.push(CloudPoint { pair_index, ..point }),
             Err(reason) => *cloud.dropped.entry(reason).or_default() += 1,
         }
     }
     Ok(cloud)
+}
+
+/// The pose at the exposure of a row of each image, and the gates of a point there.
+struct OfRows {
+    joints: [JointsAt; 2],
+    pose: RigPose,
+    gates: Gates,
+}
+
+impl OfRows {
+    fn new(joints: [JointsAt; 2], rig: &Rig, calibration: &SharedCovariance, gates: &Gates) -> Self {
+        let pose = rig.pose_of_rows(&joints[0], &joints[1], calibration);
+        Self { gates: Gates { shared: pose.shared, ..*gates }, joints, pose }
+    }
 }
 
 fn point(
@@ -72,8 +90,7 @@ fn point(
     gates: &Gates,
 ) -> Result<CloudPoint, DropReason> {
     let pair = StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
-    let gates = Gates { shared: pose.shared, ..*gates };
-    let point = cloud_point(pixels, sigma, &pair, &gates)?;
+    let point = cloud_point(pixels, sigma, &pair, gates)?;
     let reference_from_left: Transform<Left, Left> = *reference_from_base * pose.base_from_left;
     let turn = reference_from_left.rotation().to_rotation_matrix();
     Ok(CloudPoint {

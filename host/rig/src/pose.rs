@@ -219,6 +219,13 @@ impl Rig {
         (difference(&exact, &off(counts)) - difference(&exact, &off(-counts))) / 2.0
     }
 
+    /// The poses of the left camera in the base frame and of the right one in the left frame with the axes at exactly `values` (millimetres
+    /// or radians), as in [`Self::pose_at_values`], and not how uncertain they are, which takes longer.
+    #[must_use]
+    pub fn cameras_at_values(&self, values: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
+        self.transforms(values, values)
+    }
+
     fn values(&self, joints: &JointsAt) -> Vec<f64> {
         self.axes.iter().zip(&joints.counts).map(|(axis, &counts)| axis.value_at(counts)).collect()
     }
