@@ -59,20 +59,26 @@ impl RayTable {
         let rays = directions_of_all(size, &lens_rays);
         let (width, stride) = (size.width as usize, size.width as usize + 2);
         let inner = rays.par_chunks(stride).skip(1).take(size.height as usize);
-        let thetas: Vec<Angle> = inner
-            .flat_map_iter(|row| row[1..=width].iter().map(|ray| Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos())))
-            .collect();
-        let of_each = |value: &(dyn Fn(Angle) -> f64 + Sync)| -> Vec<f32> {
-            let in_field = |theta: &Angle| if theta.rad().is_nan() { 0.0 } else { value(*theta) as f32 };
-            thetas.par_iter().map(in_field).collect()
-        };
+        let mut planes = [(); 4].map(|()| vec![0.0; width * size.height as usize]);
+        let [pitches, exposures, spots, pupils] = planes.each_mut().map(|plane| plane.par_chunks_mut(width.max(1)));
+        let rows = pitches.zip(exposures).zip(spots.zip(pupils)).zip(inner);
+        rows.for_each(|(((pitches, exposures), (spots, pupils)), rays)| {
+            for (x, ray) in rays[1..=width].iter().enumerate().filter(|(_, ray)| !ray[2].is_nan()) {
+                let theta = Angle::from_rad(ray[2].clamp(-1.0, 1.0).acos());
+                pitches[x] = (1.0 / lens.pixels_per_radian(theta)) as f32;
+                exposures[x] = optics.light_at(theta, lens) as f32;
+                spots[x] = lens.spot_variance(theta) as f32;
+                pupils[x] = lens.pupil(theta).map_or(0.0, |shift| shift.mm() as f32);
+            }
+        });
+        let [pitches, exposures, spots, pupils] = planes;
         Self {
             size,
             rays: [0, 1, 2].map(|axis| rays.iter().map(|ray| ray[axis] as f32).collect()),
-            pitches: of_each(&|theta| 1.0 / lens.pixels_per_radian(theta)),
-            exposures: of_each(&|theta| optics.light_at(theta, lens)),
-            spots: of_each(&|theta| lens.spot_variance(theta)),
-            pupils: of_each(&|theta| lens.pupil(theta).map_or(0.0, |shift| shift.mm())),
+            pitches,
+            exposures,
+            spots,
+            pupils,
             kept: Arc::default(),
         }
     }
@@ -180,15 +186,16 @@ fn look(
     for block in bundle.blocks() {
         let [left, top] = [block.owners[0] as usize % width, block.owners[0] as usize / width];
         let levels = levels(&block.lights);
-        let columns = TILE.min(width - left);
-        for (row, from) in rows.rows(top).zip((0..QUICK_LANES).step_by(TILE)) {
-            let (lanes, pixels) = (from..from + columns, left..left + columns);
+        let (columns, height) = (TILE.min(width - left), TILE.min(rows.height() - top));
+        for row in 0..height {
+            let lanes = row * TILE..row * TILE + columns;
+            let ([red, green, blue, shown], surfaces) = rows.pixels([left, top + row], columns);
             // Outside the field there is no light.
-            for (shown, light) in row.light.into_iter().zip(&block.lights) {
-                copy_row(&mut shown[pixels.clone()], &light[lanes.clone()]);
+            for (shown, light) in [red, green, blue].into_iter().zip(&block.lights) {
+                copy_row(shown, &light[lanes.clone()]);
             }
-            copy_row(&mut row.levels[pixels.clone()], &levels[lanes.clone()]);
-            copy_row(&mut row.surfaces[pixels], &block.surfaces[lanes]);
+            copy_row(shown, &levels[lanes.clone()]);
+            copy_row(surfaces, &block.surfaces[lanes]);
         }
     }
     bundle.clear();

@@ -1,46 +1,37 @@
 //! What the rays through the centres of the pixels of an image meet, for images in real time.
 //!
-//! All rows lie in a few large pieces of memory: the system gets these back, but not what is left between many small ones.
+//! Each channel lies in one large piece of memory: the system gets it back, but not what is left between many small ones.
 
 use rayon::prelude::*;
 
 use crate::texture::Rgb;
 use crate::trace::NOTHING;
 
-/// The numbers of each row: red, green and blue, and the level.
-const PLANES: usize = 4;
-const LEVEL: usize = 3;
-
-/// What the rays through the centres of the pixels meet.
+/// What the rays through the centres of the pixels meet, row by row.
 #[derive(Clone, Debug)]
 pub struct Canvas {
     width: usize,
-    /// Row by row, of each row plane by plane.
-    planes: Vec<f32>,
+    light: [Vec<f32>; 3],
+    levels: Vec<f32>,
     surfaces: Vec<u32>,
 }
 
 /// Some rows of a canvas, to be written.
 pub struct CanvasRows<'a> {
     width: usize,
-    planes: &'a mut [f32],
-    surfaces: &'a mut [u32],
-}
-
-/// The pixels of one row of a canvas, to be written.
-pub struct CanvasRow<'a> {
     /// Red, green and blue; none outside the field.
-    pub light: [&'a mut [f32]; 3],
+    light: [&'a mut [f32]; 3],
     /// The square root of the mean of the colours.
-    pub levels: &'a mut [f32],
+    levels: &'a mut [f32],
     /// Numbers of the surfaces; [`NOTHING`] where nothing is met, and outside the field.
-    pub surfaces: &'a mut [u32],
+    surfaces: &'a mut [u32],
 }
 
 impl Canvas {
     /// Of so many columns and rows, at least one.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, planes: vec![0.0; PLANES * width * height], surfaces: vec![NOTHING; width * height] }
+        let dark = || vec![0.0; width * height];
+        Self { width, light: [dark(), dark(), dark()], levels: dark(), surfaces: vec![NOTHING; width * height] }
     }
 
     /// Number of columns.
@@ -55,19 +46,19 @@ impl Canvas {
         self.surfaces.len() / self.width
     }
 
-    /// One colour of a row: see [`CanvasRow::light`].
+    /// One colour of a row; none outside the field.
     #[inline]
     pub fn light(&self, channel: usize, y: usize) -> &[f32] {
-        &self.planes[(PLANES * y + channel) * self.width..][..self.width]
+        &self.light[channel][y * self.width..][..self.width]
     }
 
-    /// See [`CanvasRow::levels`].
+    /// The square roots of the means of a row's colours.
     #[inline]
     pub fn levels(&self, y: usize) -> &[f32] {
-        self.light(LEVEL, y)
+        &self.levels[y * self.width..][..self.width]
     }
 
-    /// See [`CanvasRow::surfaces`].
+    /// Numbers of a row's surfaces; [`NOTHING`] where nothing is met, and outside the field.
     #[inline]
     pub fn surfaces(&self, y: usize) -> &[u32] {
         &self.surfaces[y * self.width..][..self.width]
@@ -76,23 +67,26 @@ impl Canvas {
     /// The light of a pixel.
     #[inline]
     pub fn light_at(&self, [x, y]: [usize; 2]) -> Rgb {
-        let (at, width) = (PLANES * y * self.width + x, self.width);
-        [self.planes[at], self.planes[at + width], self.planes[at + 2 * width]]
+        let (at, [red, green, blue]) = (y * self.width + x, &self.light);
+        [red[at], green[at], blue[at]]
     }
 
     /// Exchanges the light of a pixel for another, and neither its level nor its surface.
     pub fn swap_light(&mut self, [x, y]: [usize; 2], light: &mut Rgb) {
-        for (channel, light) in light.iter_mut().enumerate() {
-            std::mem::swap(&mut self.planes[(PLANES * y + channel) * self.width + x], light);
+        for (channel, light) in self.light.iter_mut().zip(light) {
+            std::mem::swap(&mut channel[y * self.width + x], light);
         }
     }
 
     /// The canvas in parts of so many rows, from above.
     pub fn par_bands(&mut self, rows: usize) -> impl IndexedParallelIterator<Item = CanvasRows<'_>> {
-        let width = self.width;
-        let planes = self.planes.par_chunks_mut(PLANES * width * rows);
-        let bands = planes.zip(self.surfaces.par_chunks_mut(width * rows));
-        bands.map(move |(planes, surfaces)| CanvasRows { width, planes, surfaces })
+        let (width, [red, green, blue]) = (self.width, &mut self.light);
+        let [red, green, blue, levels] =
+            [red, green, blue, &mut self.levels].map(|plane| plane.par_chunks_mut(width * rows));
+        let planes = red.zip(green).zip(blue).zip(levels);
+        planes.zip(self.surfaces.par_chunks_mut(width * rows)).map(move |((((red, green), blue), levels), surfaces)| {
+            CanvasRows { width, light: [red, green, blue], levels, surfaces }
+        })
     }
 }
 
@@ -102,14 +96,11 @@ impl CanvasRows<'_> {
         self.surfaces.len() / self.width
     }
 
-    /// The rows from row `top` of these on.
-    pub fn rows(&mut self, top: usize) -> impl Iterator<Item = CanvasRow<'_>> {
-        let planes = self.planes.chunks_exact_mut(PLANES * self.width);
-        planes.zip(self.surfaces.chunks_exact_mut(self.width)).skip(top).map(|(planes, surfaces)| {
-            let (red, others) = planes.split_at_mut(surfaces.len());
-            let (green, others) = others.split_at_mut(surfaces.len());
-            let (blue, levels) = others.split_at_mut(surfaces.len());
-            CanvasRow { light: [red, green, blue], levels, surfaces }
-        })
+    /// Pixels of a row from column `x` on, as many as `count`: red, green, blue and levels, and the surfaces.
+    #[inline]
+    pub fn pixels(&mut self, [x, y]: [usize; 2], count: usize) -> ([&mut [f32]; 4], &mut [u32]) {
+        let (at, [red, green, blue]) = (y * self.width + x..y * self.width + x + count, &mut self.light);
+        let planes = [red, green, blue, &mut self.levels].map(|plane| &mut plane[at.clone()]);
+        (planes, &mut self.surfaces[at])
     }
 }
