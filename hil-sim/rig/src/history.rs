@@ -134,5 +134,23 @@ mod tests {
         // After the last tick nothing moves.
         assert!((baseline(9e9) - (100.0 + 0.08 * 1_503.0)).abs() < 1e-9);
         assert!(LoadHistory::default().pose_at(&rig, 0.0).is_none());
+        assert!(LoadHistory::default().cameras_at(&rig, 0.0).is_none());
+    }
+
+    /// On a straight rail, on a bent one, and of a trunk.
+    #[test]
+    fn an_image_has_the_cameras_where_the_pose_has_them() {
+        let bench = vergence_rig::BENCH_TOML;
+        let rigs = [bench, bench, include_str!("../../../docs/rigs/origaker.toml")];
+        let bent = BentRail { axis: 0, sagitta: nalgebra::Vector3::new(0.3, 0.0, 0.1) };
+        for (toml, rail) in rigs.into_iter().zip([None, Some(bent), None]) {
+            let rig = Rig::from_toml(toml).expect("a rig");
+            let mut history = LoadHistory { rail, ..LoadHistory::default() };
+            let loads =
+                |tick: f64| if rig.trunk.is_some() { vec![0.3 + 0.1 * tick; 8] } else { vec![1e5 + 80.0 * tick; 2] };
+            (0..2_u32).for_each(|tick| history.push(Microseconds(u64::from(tick)), loads(f64::from(tick))));
+            let pose = history.pose_at(&rig, 0.4).expect("it is kept");
+            assert_eq!(history.cameras_at(&rig, 0.4), Some((pose.base_from_left, pose.left_from_right)));
+        }
     }
 }

@@ -77,3 +77,20 @@ fn an_image_is_the_same_after_others() {
         assert!(first == quick(&room, &*lens, &table, 30.0, 3), "{name}");
     }
 }
+
+/// What is kept while nothing moves is not shown where something has: each image is the one that a new table makes.
+#[test]
+fn what_is_kept_is_of_this_scene_and_pose() {
+    let scenes = [Scene::room(), Scene::corridor()];
+    for (name, lens) in lenses() {
+        let table = RayTable::new(&*lens, &STILL);
+        for (number, yaw_deg, seed) in
+            [(0, 30.0, 3), (0, 30.0, 4), (1, 30.0, 4), (1, 31.0, 4), (1, 31.0, 3), (0, 30.0, 4)]
+        {
+            let scene = &scenes[number];
+            let image = quick(scene, &*lens, &table, yaw_deg, seed);
+            let alone = quick(scene, &*lens, &RayTable::new(&*lens, &STILL), yaw_deg, seed);
+            assert!(image == alone, "{name}: scene {number} at {yaw_deg}, seed {seed}");
+        }
+    }
+}
