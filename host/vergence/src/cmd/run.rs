@@ -22,6 +22,7 @@ use crate::cmd::result_options::ResultOptions;
 use crate::console::Console;
 use crate::failure::{Failure, FailureKind};
 use crate::interrupt::interrupted;
+use crate::stopwatch::Stopwatch;
 
 /// Pairs the images of both cameras, matches and triangulates them, again and again: a cloud of the newest pair whenever the
 /// matcher is free, in the frame of the left camera. Nothing queues, and no cloud holds anything of an older one; skipped
@@ -103,7 +104,7 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         recorder: recording.as_ref().map(|recording| recording.recorder.clone()),
         publication,
     };
-    let mut totals = Totals::default();
+    let (mut totals, measuring) = (Totals::default(), Stopwatch::start());
     if let (Some(board), Some(trigger)) = (&board, trigger) {
         board.ask(Request::SetTrigger(trigger)).await?;
     }
@@ -115,6 +116,10 @@ pub async fn run(args: &Args, common: &CommonOptions, console: Console) -> Resul
         _ => settle(&mut board, &tour).await,
     };
     tell(&totals, console)?;
+    if is_simulated {
+        let rate = (totals.clouds + totals.bearings) as f64 / measuring.seconds();
+        console.say(format!("{rate:.1} results a second of real time, with all that is simulated"))?;
+    }
     if let (Some(recording), Some(folder)) = (recording, &args.record) {
         tell_recorded(recording.finish().await?, folder, console)?;
     }
