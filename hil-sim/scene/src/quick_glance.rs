@@ -33,7 +33,7 @@ impl Glance {
     /// Whether it is also what this scene shows from these poses of the rows.
     pub fn is_of(&self, scene: &Scene, poses: &[Transform<World, Camera>]) -> bool {
         self.poses == poses
-            && self.backdrop == scene.backdrop
+            && self.backdrop.map(f32::to_bits) == scene.backdrop.map(f32::to_bits)
             && self.lighting == scene.lighting
             && self.solids == scene.solids
     }
