@@ -15,7 +15,8 @@ use common::rendered::{band, seeds};
 use image::RgbImage;
 use nalgebra::Vector3;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
-use vergence_rig::{Rig, RigCalibration};
+use vergence_reproduce::own_frame;
+use vergence_rig::{Rig, RigCalibration, RigPose};
 use vergence_vision::{Kernel, Left, PixelPair, Point};
 
 /// Standard deviation of matched pixels: small, so that the error of the calibration is not hidden by theirs.
@@ -25,12 +26,16 @@ const MATCH_PX: f64 = 0.03;
 const OWN_VIEWS: usize = 10;
 
 /// The square of a point's error in units of its stated covariance, by one file; `None` where both cameras do not see it.
-fn nees(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Point<Left>) -> Option<f64> {
-    let pose = PairPose::standing(file.pose_read_at(read));
+fn nees(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Vector3<f64>) -> Option<f64> {
+    over(file, file.pose_read_at(read), seen, truth)
+}
+
+fn over(file: &Rig, pose: RigPose, seen: &PixelPair, truth: &Vector3<f64>) -> Option<f64> {
+    let pose = PairPose::standing(pose);
     let image = RgbImage::new(1, 1);
     let cloud = cloud_of_pairs(&[(*seen, MATCH_PX)], &image, file, &pose, Kernel::default()).expect("no axis moves");
     let found = cloud.points.first()?.point;
-    let error = found.point.mm() - truth.mm();
+    let error = found.point.mm() - truth;
     Some(error.dot(&found.covariance.cholesky()?.solve(&error)))
 }
 
@@ -64,6 +69,7 @@ fn trial(seed: u64, separations: [f64; 2], eyes: Eyes) -> [f64; 3] {
     let written = Rig::from_toml(&calibrated(&rig, lenses, work.path(), &mut dice)).expect("a rig");
     assert!(matches!(written.calibration, RigCalibration::Covariance(_)), "the file holds a covariance");
     let unknown = Rig { calibration: RigCalibration::Unknown, ..written.clone() };
+    let turn = own_frame(&written.left_camera, &rig.left_camera);
     let mut sums = [0.0; 3];
     let mut points = 0;
     while points < POINTS {
@@ -79,6 +85,8 @@ fn trial(seed: u64, separations: [f64; 2], eyes: Eyes) -> [f64; 3] {
         else {
             continue;
         };
+        // In the frame of the left camera's rays.
+        let truth = turn * truth.mm();
         let seen = PixelPair { left: noisy(left, MATCH_PX, &mut dice), right: noisy(right, MATCH_PX, &mut dice) };
         let Some(stated) = nees(&written, &read, &seen, &truth) else { continue };
         // Its gates may refuse what it takes for impossible; that counts as far off.
@@ -92,14 +100,10 @@ fn trial(seed: u64, separations: [f64; 2], eyes: Eyes) -> [f64; 3] {
 }
 
 /// [`nees`] with the covariance of the pose alone.
-fn without_lenses(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Point<Left>) -> Option<f64> {
+fn without_lenses(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Vector3<f64>) -> Option<f64> {
     let mut pose = file.pose_read_at(read);
     pose.shared = vergence_vision::SharedCovariance::exact().with_pose(&pose.covariance());
-    let cloud =
-        cloud_of_pairs(&[(*seen, MATCH_PX)], &RgbImage::new(1, 1), file, &PairPose::standing(pose), Kernel::default());
-    let found = cloud.expect("no axis moves").points.first()?.point;
-    let error = found.point.mm() - truth.mm();
-    Some(error.dot(&found.covariance.cholesky()?.solve(&error)))
+    over(file, pose, seen, truth)
 }
 
 /// Points of one seed share its calibration, so a seed counts as one draw of three squared errors. A file may state too large errors of lenses that

@@ -26,6 +26,7 @@ use live_pair::live_pair;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use photograph_files::calibrated;
 use vergence_pipeline::ColouredPoint;
+use vergence_reproduce::own_frame;
 use vergence_rig::{AxisPosition, CalibratedNumbers, Provenance, Rig, RigCalibration, RigNumber, RigPose};
 use vergence_scene::{Optics, Target};
 use vergence_sim::{HeldTarget, Room, RoomCamera, photograph_target};
@@ -46,6 +47,8 @@ const FEWEST: usize = 30;
 /// A bench off its drawing, the folder of its photographs and files, and the seed of both.
 struct Trial {
     bench: Rig,
+    /// How the frame of the left camera's rays, as the file of the calibration has them, is turned against the true one.
+    turn: UnitQuaternion<f64>,
     room: Arc<Room>,
     dice: Dice,
     work: tempfile::TempDir,
@@ -71,7 +74,7 @@ impl Trial {
         let bench = as_built(&mut dice).with_sensors(WIDTH).expect("a size");
         let bench = mounted(bench, &mut Dice::new(seed + 77_000));
         let work = tempfile::tempdir().expect("a temporary folder");
-        Self { bench, room: Arc::new(Room::with_rig()), dice, work, seed }
+        Self { bench, turn: UnitQuaternion::identity(), room: Arc::new(Room::with_rig()), dice, work, seed }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -88,7 +91,9 @@ impl Trial {
             self.photograph_own(side, &self.path(&side.to_string()));
         }
         self.photograph_set();
-        calibrated(self.work.path(), "20mm", &[])
+        let written = calibrated(self.work.path(), "20mm", &[])?;
+        self.turn = own_frame(&written.left_camera, &self.bench.left_camera);
+        Some(written)
     }
 
     /// Photographs of the target by one camera, all over its field.
@@ -195,11 +200,11 @@ impl Trial {
             StereoPair { left: &rig.left_camera, right: &rig.right_camera, left_from_right: pose.left_from_right };
         let gates = Gates { epipolar_sigmas: 1e6, max_relative_sigma: 1e6, ..Gates::default() };
         let by_true_rig = cloud_point(&point.pixels, gates.pixel_sigma, &stereo, &gates).ok()?.point.mm();
-        (off < CORRECT_PX).then_some(Truth { place: place.mm(), by_true_rig })
+        (off < CORRECT_PX).then_some(Truth { place: self.turn * place.mm(), by_true_rig: self.turn * by_true_rig })
     }
 }
 
-/// Where a point truly is, and where the true bench would find it by the pixels that were matched.
+/// Where a point truly is, and where the true bench would find it by the pixels that were matched, in the frame of the left camera's rays.
 struct Truth {
     place: Vector3<f64>,
     by_true_rig: Vector3<f64>,

@@ -20,6 +20,7 @@ use image::RgbImage;
 use nalgebra::Vector3;
 use serde_json::Value;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
+use vergence_reproduce::own_frame_by;
 use vergence_rig::{LensField, Provenance, Rig, RigCalibration};
 use vergence_vision::{KannalaBrandt, Kernel, Left, Pixel, PixelPair, Point};
 
@@ -98,11 +99,11 @@ fn decentred(lens: &KannalaBrandt, at: &Vector3<f64>) -> Option<Pixel> {
 }
 
 /// The square of a point's error over its stated covariance, and whether it is marked; `None` where it is no point.
-fn nees(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Point<Left>) -> Option<(f64, bool)> {
+fn nees(file: &Rig, read: &[f64; 2], seen: &PixelPair, truth: &Vector3<f64>) -> Option<(f64, bool)> {
     let pose = PairPose::standing(file.pose_read_at(read));
     let cloud = cloud_of_pairs(&[(*seen, MATCH_PX)], &RgbImage::new(1, 1), file, &pose, Kernel::default());
     let point = cloud.expect("no axis moves").points.first()?.point;
-    let error = point.point.mm() - truth.mm();
+    let error = point.point.mm() - truth;
     Some((error.dot(&point.covariance.cholesky()?.solve(&error)), point.extrapolated))
 }
 
@@ -115,10 +116,13 @@ fn trial<const N: usize>(seed: u64, lens: LensAt, rings: [[f64; 2]; N]) -> [[f64
     assert!((50.0..72.0).contains(&limit), "the lens is measured to {limit} degrees");
     let [left, right] = [bench.rig.left_camera, bench.rig.right_camera];
     let (left, right) = (move |at: &Vector3<f64>| lens(&left, at), move |at: &Vector3<f64>| lens(&right, at));
+    let turn = own_frame_by(&bench.written.left_camera, &left);
     rings.map(|ring| {
         let (mut sum, mut found) = (0.0, 0);
         for _ in 0..POINTS {
             let (read, seen, truth) = bench.show(ring, [&left, &right]);
+            // In the frame of the left camera's rays.
+            let truth = turn * truth.mm();
             let Some((square, marked)) = nees(&wide, &read, &seen, &truth) else { continue };
             (sum, found) = (sum + square, found + 1);
             if ring[0] > limit {

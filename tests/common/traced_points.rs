@@ -1,7 +1,7 @@
 //! How far points are off that a rig file gives of matches through true lenses, and how far it states them to be.
 
 use image::RgbImage;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use vergence_pipeline::{PairPose, cloud_of_pairs};
 use vergence_reproduce::own_frame;
 use vergence_rig::{Rig, RigPose};
@@ -25,10 +25,10 @@ pub struct Figures {
     pub stated_mm: f64,
 }
 
-/// A file's figures at 30 points about 350 mm away, with the axes set anywhere within `separations`.
+/// A file's figures at 30 points about 350 mm away, with the axes set anywhere within `separations`, in the frame of the left camera's rays.
 pub fn figures(
     [rig, file]: [&Rig; 2],
-    lenses: ([&dyn Lens; 2], bool),
+    lenses: [&dyn Lens; 2],
     separations: [f64; 2],
     match_px: f64,
     dice: &mut Dice,
@@ -40,7 +40,7 @@ pub fn figures(
 pub fn figures_by(
     stated: &dyn Fn(&[f64; 2]) -> RigPose,
     [rig, file]: [&Rig; 2],
-    (lenses, is_displaced): ([&dyn Lens; 2], bool),
+    lenses: [&dyn Lens; 2],
     separations: [f64; 2],
     match_px: f64,
     dice: &mut Dice,
@@ -48,8 +48,7 @@ pub fn figures_by(
     const POINTS: usize = 30;
     let mut sums = Figures::default();
     let mut points = 0;
-    // A lens without an axis has the frame that its calibration gives it.
-    let turn = if is_displaced { own_frame(&file.left_camera, lenses[0]) } else { UnitQuaternion::identity() };
+    let turn = own_frame(&file.left_camera, lenses[0]);
     while points < POINTS {
         let share = 0.5 + 0.5 * dice.uniform();
         let wished =

@@ -1,8 +1,7 @@
 //! Uncertainty of the ray behind a pixel, from the covariance of the lens.
 
-use std::f64::consts::PI;
-
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, Vector3};
+use nalgebra::{Matrix2, Matrix3x2, SMatrix, Vector3};
+use vergence_rig::common_turn_by_lens;
 use vergence_vision::{Angle, Camera, KannalaBrandt, OutsideField, Pixel, UnitRay};
 
 use crate::IntrinsicsCalibration;
@@ -56,10 +55,8 @@ impl RayUncertainty {
     /// The ray uncertainty of a calibrated lens.
     #[must_use]
     pub fn of(calibration: &IntrinsicsCalibration) -> Self {
-        let mut uncertainty =
-            Self { camera: calibration.camera, covariance: calibration.covariance, rotation_by_lens: SMatrix::zeros() };
-        uncertainty.rotation_by_lens = uncertainty.common_rotation();
-        uncertainty
+        let camera = calibration.camera;
+        Self { camera, covariance: calibration.covariance, rotation_by_lens: common_turn_by_lens(&camera) }
     }
 
     /// Ray at `pixel`, its covariance without the rotation common to all rays.
@@ -105,27 +102,6 @@ impl RayUncertainty {
     /// Derivative of the direction of the ray behind a fixed pixel with respect to the lens, from ∂u/∂d δd + ∂u/∂lens δlens = 0.
     fn ray_by_lens(&self, ray: &UnitRay<Camera>) -> SMatrix<f64, 3, LENS> {
         -(self.camera.ray_by_pixel(ray) * self.camera.pixel_by_lens(ray))
-    }
-
-    /// The ω that minimises Σ ‖δd + ω × d‖² over directions d that fill the valid cone evenly (a Fibonacci lattice; R.
-    /// Swinbank and R. Purser, 2006), as a linear function of δlens.
-    fn common_rotation(&self) -> SMatrix<f64, 3, LENS> {
-        const DIRECTIONS: u32 = 500;
-        const GOLDEN: f64 = 2.399_963_229_728_653;
-        let lowest = self.camera.theta_max().rad().min(PI).cos();
-        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), SMatrix::<f64, 3, LENS>::zeros());
-        for i in 0..DIRECTIONS {
-            let z = 1.0 - (1.0 - lowest) * (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
-            let (sin, cos) = (GOLDEN * f64::from(i)).sin_cos();
-            let across = (1.0 - z * z).sqrt();
-            let ray = UnitRay::new(Vector3::new(across * cos, across * sin, z));
-            let Some(ray) = ray else { continue };
-            let by_lens = self.ray_by_lens(&ray);
-            let cross = ray.vector().cross_matrix();
-            normal += cross.transpose() * cross;
-            right += cross.transpose() * by_lens;
-        }
-        normal.try_inverse().map_or_else(SMatrix::zeros, |inverse| inverse * right)
     }
 }
 

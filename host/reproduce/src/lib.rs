@@ -60,7 +60,7 @@ pub use matching::{Matching, MatchingTools, Outcome, Picture, matchings};
 pub use measure::{Measured, Sample};
 pub use method::{METHODS, Method};
 pub use one_seed::{SeedResult, one_seed};
-pub use own_frame::own_frame;
+pub use own_frame::{own_frame, own_frame_by};
 pub use page::{Findings, reproduction_page};
 pub use sgbm::{SgbmAnswer, SgbmTask};
 pub use tally::{Figures, Row, Table};

@@ -1,8 +1,8 @@
 //! The bench itself: targets 350 mm before the rig, every corner measured by every method and compared with the truth.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
-use vergence_scene::Target;
+use vergence_scene::{Lens, Target};
 use vergence_vision::{
     KannalaBrandt, Kernel, Left, Length, PixelPair, Point, PointUncertainty, ResidualUncertainty, Right,
     SharedCovariance, StereoPair, Transform, UnitRay, ray_to_plane,
@@ -14,6 +14,7 @@ use crate::chain::Calibrated;
 use crate::drive::Stop;
 use crate::eyes::Eyes;
 use crate::method::Method;
+use crate::own_frame::own_frame;
 use crate::pair::{PAIR_VIEWS, Pair};
 use crate::target_shot::{FoundCorners, Photo, same_place};
 use crate::targets::{Spread, targets};
@@ -90,7 +91,7 @@ pub fn measure(
                 Seen::of(&eyes.photographs(standing, target, seed ^ index as u64), calibrated)
             })
             .collect();
-        let view = View::new(mode, stop, calibrated, pair);
+        let view = View::new(mode, stop, calibrated, pair, &eyes.lenses[0]);
         let mut squares = Vec::new();
         let mut undistorted = Undistorted { views: [pair.views[1], PAIR_VIEWS], ..Undistorted::default() };
         for (target, seen) in targets.iter().zip(&seen) {
@@ -134,6 +135,8 @@ struct View<'a> {
     own: &'a [KannalaBrandt; 2],
     pair: &'a Pair,
     truth: Axes,
+    /// How the left camera's own frame is turned against its true one, as the stage's calibration found it and as its own calibration did.
+    turns: [UnitQuaternion<f64>; 2],
 }
 
 /// A corner that both cameras see.
@@ -144,7 +147,7 @@ struct Match {
 }
 
 impl<'a> View<'a> {
-    fn new(mode: usize, stop: &Stop, calibrated: &'a Calibrated, pair: &'a Pair) -> Self {
+    fn new(mode: usize, stop: &Stop, calibrated: &'a Calibrated, pair: &'a Pair, left: &dyn Lens) -> Self {
         let Calibrated { stage, rig, own, .. } = calibrated;
         let values: Vec<f64> = stop.readings.iter().map(|reading| reading.value()).collect();
         let pose = rig.pose_read_at(&values);
@@ -160,6 +163,7 @@ impl<'a> View<'a> {
             own,
             pair,
             truth: Axes::of(&stop.truth),
+            turns: [&rig.left_camera, &own[0]].map(|found| own_frame(found, left)),
         }
     }
 
@@ -215,7 +219,7 @@ impl<'a> View<'a> {
     fn by_ours(&self, Match { pixels, sigma_px }: &Match, truth: &Point<Left>) -> Option<Sample> {
         let point = Kernel::PseudoIntersection.triangulate(pixels, &self.ours).ok()?.point;
         let uncertain = PointUncertainty::of(&point, &self.ours, *sigma_px)?;
-        let forward = self.truth.forward;
+        let forward = self.turns[0] * self.truth.forward;
         let along = |covariance: nalgebra::Matrix3<f64>| (forward.transpose() * covariance * forward).x;
         let variance = [along(uncertain.from_pixels), along(uncertain.covariance_with(&uncertain, &self.shared))];
         Some(self.sample(Method::Ours, &point, truth, Some(variance)))
@@ -242,10 +246,11 @@ impl<'a> View<'a> {
     ) -> Sample {
         let forward = self.truth.forward;
         let from_middle = truth.mm() - self.truth.middle;
+        let turn = self.turns[if method == Method::Ours { 0 } else { 1 }];
         Sample {
             mode: self.mode,
             method,
-            error_mm: (point.mm() - truth.mm()).dot(&forward),
+            error_mm: (point.mm() - turn * truth.mm()).dot(&(turn * forward)),
             depth_mm: from_middle.dot(&forward),
             field_deg: from_middle.angle(&forward).to_degrees(),
             variance_mm2,
@@ -256,7 +261,7 @@ impl<'a> View<'a> {
     fn square(&self, Match { pixels, sigma_px }: &Match, truth: &Point<Left>) -> Option<f64> {
         let point = Kernel::PseudoIntersection.triangulate(pixels, &self.ours).ok()?.point;
         let covariance = PointUncertainty::of(&point, &self.ours, *sigma_px)?.covariance(&self.shared);
-        let error = point.mm() - truth.mm();
+        let error = point.mm() - self.turns[0] * truth.mm();
         Some(error.dot(&covariance.cholesky()?.solve(&error)))
     }
 }

@@ -1,13 +1,11 @@
 //! The frame of a lens whose elements are not where they belong.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use vergence_rig::even_directions;
 use vergence_scene::Lens;
-use vergence_vision::{Camera, KannalaBrandt, Pixel};
+use vergence_vision::{Camera, KannalaBrandt, Pixel, Point};
 
-/// Pixels along each side of the image whose light is compared.
-const ALONG: u32 = 24;
-
-/// How the frame that a calibration gives a lens is turned against the frame of its barrel, by the light of pixels all over the image:
+/// How the frame that a calibration gives a lens is turned against the frame of its barrel, by light from all over its field:
 /// `found = turn * barrel`.
 ///
 /// A lens with displaced elements has no axis, and nobody sees its barrel in images: a turn of the frame by some thousandths of a radian looks
@@ -15,15 +13,19 @@ const ALONG: u32 = 24;
 /// is in that one. Distances between points do not depend on it.
 #[must_use]
 pub fn own_frame(found: &KannalaBrandt, truth: &dyn Lens) -> UnitQuaternion<f64> {
-    let size = found.size();
-    let at = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(ALONG) * f64::from(of);
+    own_frame_by(found, &|at| truth.image_of(&Point::from_mm(*at)))
+}
+
+/// [`own_frame`] of a lens that is given by where it images a place in its frame, in millimetres.
+#[must_use]
+pub fn own_frame_by(found: &KannalaBrandt, image_of: &dyn Fn(&Vector3<f64>) -> Option<Pixel>) -> UnitQuaternion<f64> {
+    /// So far away that a pupil's shift is nothing.
+    const FAR_MM: f64 = 1e7;
     let mut products = Matrix3::zeros();
-    for (column, row) in (0..ALONG).flat_map(|column| (0..ALONG).map(move |row| (column, row))) {
-        let pixel = Pixel { u: at(column, size.width), v: at(row, size.height) };
-        let (Ok(ours), Some((_, true_ray))) = (found.unproject::<Camera>(pixel), truth.light_of(pixel)) else {
-            continue;
-        };
-        products += ours.vector() * true_ray.vector().transpose();
+    for direction in even_directions(found) {
+        let truth = direction.vector();
+        let ours = image_of(&(FAR_MM * truth)).and_then(|pixel| found.unproject::<Camera>(pixel).ok());
+        products += ours.map_or_else(Matrix3::zeros, |ours| ours.vector() * truth.transpose());
     }
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&products))
 }

@@ -30,7 +30,7 @@ use vergence_live::{Limits, LiveError, LiveLoop, LiveResult, MatchingTime, Measu
 use vergence_matching::TrackingMatcher;
 use vergence_pipeline::{ColouredPoint, Exposures, Observation};
 use vergence_protocol::{Mode, Request, SessionId, Trigger};
-use vergence_reproduce::LensedRig;
+use vergence_reproduce::{LensedRig, own_frame};
 use vergence_rig::{AxisPosition, BENCH_TOML, LensField, Rig, RigCalibration, RigPose, Shutter};
 use vergence_scene::{Lens, LensChoice, Scene, TrueLens};
 use vergence_sim::{LiveCamera, Random, Rendering, Room, RoomCamera, SimulatedRig};
@@ -93,6 +93,8 @@ struct World {
     drawn: Rig,
     known: Rig,
     lenses: [TrueLens; 2],
+    /// How the frames of both cameras' rays, as they are known, are turned against the true ones.
+    turns: [UnitQuaternion<f64>; 2],
     room: Arc<Room>,
     rendering: Rendering,
     seed: u64,
@@ -124,7 +126,8 @@ impl World {
 
     fn of(drawn: Rig, known: Rig, lenses: [TrueLens; 2], seed: u64) -> Self {
         let reaction = Duration::from_secs_f64(REACTION_US * 1e-6 * Random::new(seed ^ 0xfeed).between(0.0, 1.0));
-        Self { drawn, known, lenses, room: Arc::new(place(seed)), rendering: Rendering::Exact, seed, reaction }
+        let turns = [own_frame(&known.left_camera, &lenses[0]), own_frame(&known.right_camera, &lenses[1])];
+        Self { drawn, known, lenses, turns, room: Arc::new(place(seed)), rendering: Rendering::Exact, seed, reaction }
     }
 
     /// Unknowns of the pose: all six of a calibrated rig, and the two axes of one that is known exactly.
@@ -219,7 +222,9 @@ impl World {
             agreeing: 1.0,
             variance_factor: 1.0,
         };
-        let way = stated.way_to(&truth.middle.left_from_right);
+        let [left, right] = self.turns;
+        let (left, right) = (Transform::new(left, Vector3::zeros()), Transform::new(right, Vector3::zeros()));
+        let way = stated.way_to(&(left * truth.middle.left_from_right * right.inverse()));
         found.poses.push(squared(&way, &stated.covariance, self.freedom()));
         found.moving += u64::from(*moving);
     }
@@ -289,9 +294,10 @@ impl Truth<'_> {
             found.wrong += 1;
             return;
         }
-        let off = point.point.mm() - truth;
-        let towards = truth.normalize();
-        let normal = self.middle.left_from_right.origin().mm().cross(&towards).normalize();
+        let turn = self.world.turns[0];
+        let off = point.point.mm() - turn * truth;
+        let towards = turn * truth.normalize();
+        let normal = (turn * self.middle.left_from_right.origin().mm()).cross(&towards).normalize();
         found.across.push(off.dot(&normal).powi(2) / normal.dot(&(point.covariance * normal)));
         let squared = off.dot(&towards).powi(2) / towards.dot(&(point.covariance * towards));
         found.ranges.push(squared);

@@ -38,7 +38,10 @@ mod trunk;
 
 pub use axis::{AxisPosition, RigAxis, positions_in_words};
 pub use best_pose::RatedPose;
-pub use calibration::{CalibratedNumbers, InvalidCovariance, RigCalibration, RigNumber, UnknownLensErrors};
+pub use calibration::{
+    CalibratedNumbers, InvalidCovariance, RigCalibration, RigNumber, UnknownLensErrors, common_turn_by_lens,
+    even_directions,
+};
 pub use camera_file::{CalibrationTable, CameraDocument, CameraTable, Provenance};
 pub use chain::{Chain, Link, Screw};
 pub use clock::{BoardInstant, ClockDrift, ClockMap, Exchange, HostInstant};

@@ -235,7 +235,7 @@ impl Rig {
     }
 
     /// `base_from_left` with the axes at `left`, and `left_from_right` with the right camera's axes at `right`.
-    fn transforms(&self, left: &[f64], right: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
+    pub(crate) fn transforms(&self, left: &[f64], right: &[f64]) -> (Transform<Base, Left>, Transform<Left, Right>) {
         let (base_from_left, base_from_right) = match &self.trunk {
             Some(trunk) => trunk.cameras_at(left, right),
             None => (self.left_chain.base_from_camera(left), self.right_chain.base_from_camera(right)),

@@ -22,6 +22,7 @@ use crate::conditions::{Conditions, NOISE_PX};
 use crate::drive::{Drive, Standing};
 use crate::error::ReproduceError;
 use crate::eyes::Eyes;
+use crate::own_frame::own_frame;
 use crate::target_shot::Corners;
 
 /// Points at each range of each mode.
@@ -102,7 +103,7 @@ impl Trial {
             trial.seen[mode] = shown.len();
             let wide = world.measured(&standing, &world.all_over(&standing, &mut all_over), &calibrated.rig)?;
             trial.warned[mode] = drift_warning(&wide, PoseSource::Encoders).is_some();
-            let turn = world.turn_of(&calibrated.rig.left_camera);
+            let turn = own_frame(&calibrated.rig.left_camera, &world.measuring[0]);
             let forward = Axes::of(&world.pose(&standing, 0.0).left_from_right).forward;
             trial.sightings.extend(sightings(mode, &shown, &cloud, &(turn, turn * forward)));
         }

@@ -1,6 +1,6 @@
 //! The bench as it truly is, with one thing that its calibration does not assume.
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use vergence_calibration::stage_plan;
 use vergence_lens::{BuiltIn, Displacement};
 use vergence_rig::{AxisPosition, Rig, RigPose, Shutter};
@@ -12,7 +12,6 @@ use super::Mismatch;
 use crate::bench::Bench;
 use crate::drive::{STAGE_POSES, Standing, Stop};
 use crate::error::ReproduceError;
-use crate::own_frame::own_frame;
 
 /// Axes of the bench.
 const BASELINE: usize = 0;
@@ -163,14 +162,6 @@ impl World {
         match self.mismatch {
             Mismatch::RailYaw => BentRail { axis: BASELINE, sagitta: Vector3::z() * SAGITTA.mm() }.pose(rig, &values),
             _ => rig.pose_at_values(&values),
-        }
-    }
-
-    /// How the frame that a calibration gives the left lens is turned against the true one, where the lens has no axis.
-    pub fn turn_of(&self, found: &KannalaBrandt) -> UnitQuaternion<f64> {
-        match displacement(self.mismatch, 0) {
-            Some(_) => own_frame(found, &self.measuring[0]),
-            None => UnitQuaternion::identity(),
         }
     }
 

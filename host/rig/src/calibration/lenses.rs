@@ -3,6 +3,7 @@
 use nalgebra::SMatrix;
 use vergence_vision::{LENS_PARAMETERS, Side};
 
+use super::own_frame::OwnFrame;
 use super::{RigCalibration, RigNumber};
 use crate::LensField;
 use crate::rig::Rig;
@@ -39,7 +40,8 @@ impl Rig {
         if field == LensField::Extrapolated && !known { Err(UnknownLensErrors) } else { Ok(self.with_field(field)) }
     }
 
-    /// The covariance of the parameters of the lens on `side`, in the order of [`LENS_PARAMETERS`]; `None` where the file states none.
+    /// The covariance of the parameters of the lens on `side` in the frame of its rays ([`super::own_frame`]), in the order of
+    /// [`LENS_PARAMETERS`]; `None` where the file states none.
     #[must_use]
     pub fn lens_covariance(&self, side: Side) -> Option<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>> {
         let RigCalibration::Covariance(found) = &self.calibration else { return None };
@@ -55,6 +57,7 @@ impl Rig {
                 covariance[(of_row, of_column)] = found.covariance[(row, column)];
             }
         }
-        (!places.is_empty()).then_some(covariance)
+        let own = OwnFrame::of(self.camera(side), |parameter| places.iter().any(|(_, place)| *place == parameter));
+        (!places.is_empty()).then(|| own.map_or(covariance, |own| own.covariance(&covariance)))
     }
 }

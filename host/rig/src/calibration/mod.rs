@@ -2,6 +2,7 @@
 
 mod lenses;
 mod number;
+mod own_frame;
 mod table;
 
 use nalgebra::{DMatrix, Matrix6xX, SMatrix};
@@ -9,6 +10,7 @@ use vergence_vision::{Angle, LENS_PARAMETERS, Length, SHARED_PARAMETERS, SharedC
 
 pub use self::lenses::UnknownLensErrors;
 pub use self::number::RigNumber;
+pub use self::own_frame::{common_turn_by_lens, even_directions};
 pub(crate) use self::table::{CalibrationTables, SigmaFile};
 use crate::repeatability::of_components;
 use crate::rig::Rig;
@@ -146,7 +148,8 @@ impl Rig {
         }
     }
 
-    /// Derivative of the shared parameters (rows, in the order of [`SharedCovariance`]) by `numbers` (columns).
+    /// Derivative of the shared parameters (rows, in the order of [`SharedCovariance`]) by `numbers` (columns), in the frames of both cameras'
+    /// rays ([`own_frame`]).
     fn shared_by_numbers(&self, numbers: &[RigNumber], left: &[f64], right: &[f64]) -> DMatrix<f64> {
         const POSE: usize = 2 * LENS_PARAMETERS;
         let mut derivative = DMatrix::zeros(SHARED_PARAMETERS, numbers.len());
@@ -157,6 +160,8 @@ impl Rig {
                 derivative[(row, column)] = 1.0;
             }
         }
+        let (_, left_from_right) = self.transforms(left, right);
+        own_frame::in_own_frames(&mut derivative, numbers, [&self.left_camera, &self.right_camera], &left_from_right);
         derivative
     }
 }
