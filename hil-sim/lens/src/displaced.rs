@@ -191,14 +191,28 @@ impl Asymmetry {
 
     /// How far from its place by the design light at `theta` arrives, which comes from the direction of the unit vector `outward`.
     pub fn at(&self, theta: Angle, outward: Vector2<f64>) -> Vector2<f64> {
-        let terms = terms(theta.rad() / self.widest, outward.into());
-        let [along, across] = self.terms.each_ref().map(|weights| weights.dot(&terms));
+        let (powers, harmonics) = factors(theta.rad() / self.widest, outward.into());
+        let [along, across] = self.terms.each_ref().map(|weights| {
+            let mut sums = [0.0; HARMONICS];
+            for (power, weights) in powers.iter().zip(weights.as_slice().as_chunks::<HARMONICS>().0) {
+                for (sum, weight) in sums.iter_mut().zip(weights) {
+                    *sum += power * weight;
+                }
+            }
+            sums.iter().zip(&harmonics).map(|(sum, harmonic)| sum * harmonic).sum::<f64>()
+        });
         outward * along + Vector2::new(-outward.y, outward.x) * across
     }
 }
 
-/// The terms of the table at a part of the widest angle. Legendre's polynomials span the same powers, and keep their weights apart.
-fn terms(part: f64, [cos, sin]: [f64; 2]) -> SMatrix<f64, TERMS, 1> {
+/// The terms of the table at a part of the widest angle.
+fn terms(part: f64, outward: [f64; 2]) -> SMatrix<f64, TERMS, 1> {
+    let (powers, harmonics) = factors(part, outward);
+    SMatrix::from_fn(|row, _| powers[row / HARMONICS] * harmonics[row % HARMONICS])
+}
+
+/// Their factors. Legendre's polynomials span the same powers of the part, and keep their weights apart.
+fn factors(part: f64, [cos, sin]: [f64; 2]) -> ([f64; POWERS], [f64; HARMONICS]) {
     let x = 2.0 * part - 1.0;
     let mut powers = [1.0; POWERS];
     powers[1] = x;
@@ -207,6 +221,5 @@ fn terms(part: f64, [cos, sin]: [f64; 2]) -> SMatrix<f64, TERMS, 1> {
         powers[n + 1] = ((2.0 * order + 1.0) * x * powers[n] - order * powers[n - 1]) / (order + 1.0);
     }
     let (cos_2, sin_2) = (cos * cos - sin * sin, 2.0 * sin * cos);
-    let harmonics = [1.0, cos, sin, cos_2, sin_2, cos_2 * cos - sin_2 * sin, sin_2 * cos + cos_2 * sin];
-    SMatrix::from_fn(|row, _| powers[row / HARMONICS] * harmonics[row % HARMONICS])
+    (powers, [1.0, cos, sin, cos_2, sin_2, cos_2 * cos - sin_2 * sin, sin_2 * cos + cos_2 * sin])
 }

@@ -1,6 +1,6 @@
 //! A traced lens before a sensor: where a point is imaged, and from where a pixel's light comes.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Vector2, Vector3};
 use vergence_vision::{Angle, Camera, Frame, ImageSize, KannalaBrandt, Length, Pixel, Point, Transform, UnitRay};
@@ -58,7 +58,14 @@ pub struct TracedLens {
     is_bare: bool,
     /// Of displaced elements.
     asymmetry: Option<Arc<Asymmetry>>,
+    /// Of this very geometry.
+    kept: Arc<KeptDirections>,
 }
+
+/// Pixels that were asked for together, and the directions of their light.
+#[derive(Debug, Default)]
+struct KeptDirections(Mutex<Option<Asked>>);
+type Asked = (Vec<[f64; 2]>, Arc<[[f64; 3]]>);
 
 impl TracedLens {
     /// The lens of a table at some size before a sensor, as far as light at `theta_max` to its axis, or to the edge of its field where that
@@ -71,7 +78,17 @@ impl TracedLens {
         };
         let size = pixels * sensor.pixel.mm();
         let theta_max = Angle::from_rad(theta_max.rad().min(table.rays.height.end()));
-        Self { table, sensor, theta_max, pixels, size, by_centroid: false, is_bare: false, asymmetry: None }
+        Self {
+            table,
+            sensor,
+            theta_max,
+            pixels,
+            size,
+            by_centroid: false,
+            is_bare: false,
+            asymmetry: None,
+            kept: Arc::default(),
+        }
     }
 
     /// A built-in lens in the place of an ideal one: with its scale on the axis, centre, sensor and field. Pixels are `pixel` wide.
@@ -88,13 +105,13 @@ impl TracedLens {
     /// of far points at all ranges.
     #[must_use]
     pub fn by_centroid(self) -> Self {
-        Self { by_centroid: true, ..self }
+        Self { by_centroid: true, kept: Arc::default(), ..self }
     }
 
     /// The geometry of the lens alone: as bright at the edge as in the middle, and points are points.
     #[must_use]
     pub fn bare(self) -> Self {
-        Self { is_bare: true, ..self }
+        Self { is_bare: true, kept: Arc::default(), ..self }
     }
 
     /// The same lens with its elements and its sensor displaced. Its pupil is left on the axis, from where such displacements move it by some
@@ -105,7 +122,7 @@ impl TracedLens {
     pub fn displaced(self, by: &Displacement) -> Result<Self, DesignError> {
         let by = Displacement { decentre: Length::from_mm(by.decentre.mm() / self.size), ..*by };
         let asymmetry = Some(Arc::new(Asymmetry::of(&self.table.design, &by, self.theta_max)?));
-        Ok(Self { asymmetry, ..self })
+        Ok(Self { asymmetry, kept: Arc::default(), ..self })
     }
 
     /// The same lens before a part of its sensor, of `size` pixels from the pixel in column `left` and row `top` on.
@@ -113,7 +130,7 @@ impl TracedLens {
     pub fn before_part(&self, [left, top]: [u32; 2], size: ImageSize) -> Self {
         let Pixel { u, v } = self.sensor.centre;
         let centre = Pixel { u: u - f64::from(left), v: v - f64::from(top) };
-        Self { sensor: Sensor { size, centre, ..self.sensor }, ..self.clone() }
+        Self { sensor: Sensor { size, centre, ..self.sensor }, kept: Arc::default(), ..self.clone() }
     }
 
     /// The name of its design.
@@ -208,6 +225,26 @@ impl TracedLens {
         Some(LensRay { origin: Point::from_mm(Vector3::z() * self.pupil(theta).mm()), direction })
     }
 
+    /// The directions of the light of some pixels, unit vectors of the camera's frame; not numbers outside the field.
+    #[must_use]
+    pub fn directions(&self, pixels: &[[f64; 2]]) -> Vec<[f64; 3]> {
+        let direction =
+            |&[u, v]: &[f64; 2]| self.ray(Pixel { u, v }).map_or([f64::NAN; 3], |ray| ray.direction.vector().into());
+        pixels.iter().map(direction).collect()
+    }
+
+    /// [`Self::directions`], kept for whoever asks for the same pixels next: those of displaced elements take a search each.
+    #[must_use]
+    pub fn kept_directions(&self, pixels: &[[f64; 2]]) -> Arc<[[f64; 3]]> {
+        let kept = || self.kept.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, directions)) = kept().as_ref().filter(|(asked, _)| asked == pixels) {
+            return Arc::clone(directions);
+        }
+        let directions: Arc<[[f64; 3]]> = self.directions(pixels).into();
+        *kept() = Some((pixels.to_vec(), Arc::clone(&directions)));
+        directions
+    }
+
     /// Where points of a target are imaged by a camera before which it stands: exact truth for a calibration. `None` outside the field and
     /// beside the sensor.
     #[must_use]
@@ -242,7 +279,7 @@ impl TracedLens {
     /// of the way, so that each step of the search leaves less than that.
     fn as_by_design(&self, from_centre: Vector2<f64>) -> Option<Vector2<f64>> {
         const STEPS: usize = 24;
-        const NO_CHANGE_PX: f64 = 1e-12;
+        const NO_CHANGE_PX: f64 = 1e-10;
         let edge = (1.0 - 1e-9) * self.radius_px(Angle::from_rad(self.height().end()));
         let mut place = from_centre;
         if self.asymmetry.is_some() {

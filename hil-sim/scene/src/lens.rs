@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Debug};
 use std::str::FromStr;
+use std::sync::Arc;
 
 use vergence_lens::{BuiltIn, DesignError, TracedLens};
 use vergence_vision::{
@@ -67,12 +68,16 @@ impl LensRays<'_> {
     pub fn directions(&self, pixels: &[[f64; 2]]) -> Vec<[f64; 3]> {
         match self {
             Self::Ideal(lens) => lens.unproject(pixels),
-            Self::Traced(lens) => {
-                let direction = |&[u, v]: &[f64; 2]| {
-                    lens.ray(Pixel { u, v }).map_or([f64::NAN; 3], |ray| ray.direction.vector().into())
-                };
-                pixels.iter().map(direction).collect()
-            }
+            Self::Traced(lens) => lens.directions(pixels),
+        }
+    }
+
+    /// [`Self::directions`] of pixels that are asked for again and again.
+    #[must_use]
+    pub fn kept_directions(&self, pixels: &[[f64; 2]]) -> Arc<[[f64; 3]]> {
+        match self {
+            Self::Ideal(lens) => lens.unproject(pixels).into(),
+            Self::Traced(lens) => lens.kept_directions(pixels),
         }
     }
 }

@@ -181,7 +181,7 @@ impl<'a> Cells<'a> {
         let pixels: Vec<[f64; 2]> =
             (0..down + 2).flat_map(|row| (0..across + 2).map(move |column| [middle(column), middle(row)])).collect();
         let lens = view.camera.rays();
-        let nodes: Vec<Node> = lens.directions(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
+        let nodes: Vec<Node> = lens.kept_directions(&pixels).iter().map(|ray| node(view, plane, ray)).collect();
         let squares = (0..down)
             .flat_map(|row| (0..across).map(move |column| [row + 1, column + 1]))
             .map(|[row, column]| square(&nodes, across + 2, row, column))
