@@ -340,7 +340,8 @@ async fn points_and_poses_at_full_speed_are_as_uncertain_as_a_calibrated_rig_sta
     for nees in [&standing, &moving] {
         assert!((nees.pose[0] - 6.0).abs() < band(6.0), "{:?} of 6", nees.pose);
     }
-    assert!((standing.pose[0] - moving.pose[0]).abs() < 1.0, "motion adds what is not stated");
+    let by_chance = 3.0 / f64::from(count("VERGENCE_SEEDS", 1)).sqrt();
+    assert!((standing.pose[0] - moving.pose[0]).abs() < by_chance, "motion adds what is not stated");
 }
 
 #[tokio::test(start_paused = true)]
