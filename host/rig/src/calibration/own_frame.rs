@@ -32,20 +32,28 @@ pub fn even_directions(camera: &KannalaBrandt) -> impl Iterator<Item = UnitRay<C
     })
 }
 
-/// Derivative of the direction of the ray behind a fixed pixel by the lens.
-fn ray_by_lens(camera: &KannalaBrandt, ray: &UnitRay<Camera>) -> SMatrix<f64, 3, LENS_PARAMETERS> {
-    -(camera.ray_by_pixel(ray) * camera.pixel_by_lens(ray))
+/// The derivative of a direction by the lens.
+type RayByLens = SMatrix<f64, 3, LENS_PARAMETERS>;
+
+/// Even directions as cross products, and the derivatives by the lens of the rays there, behind fixed pixels.
+fn rays_by_lens(camera: &KannalaBrandt) -> Vec<(Matrix3<f64>, RayByLens)> {
+    let by_lens =
+        |ray: UnitRay<Camera>| (ray.vector().cross_matrix(), -(camera.ray_by_pixel(&ray) * camera.pixel_by_lens(&ray)));
+    even_directions(camera).map(by_lens).collect()
 }
 
 /// How all rays of a camera together turn with the parameters of its lens: the ω (3, in radians about the axes of the camera) by each parameter
 /// for which δd - d × ω is least, as a mean square over directions d that fill its measured field evenly.
 #[must_use]
 pub fn common_turn_by_lens(camera: &KannalaBrandt) -> SMatrix<f64, 3, LENS_PARAMETERS> {
-    let (mut normal, mut right) = (Matrix3::<f64>::zeros(), SMatrix::<f64, 3, LENS_PARAMETERS>::zeros());
-    for ray in even_directions(camera) {
-        let cross = ray.vector().cross_matrix();
+    common_turn(&rays_by_lens(camera))
+}
+
+fn common_turn(rays: &[(Matrix3<f64>, RayByLens)]) -> SMatrix<f64, 3, LENS_PARAMETERS> {
+    let (mut normal, mut right) = (Matrix3::<f64>::zeros(), RayByLens::zeros());
+    for (cross, by_lens) in rays {
         normal += cross.transpose() * cross;
-        right += cross.transpose() * ray_by_lens(camera, &ray);
+        right += cross.transpose() * by_lens;
     }
     normal.try_inverse().map_or_else(SMatrix::zeros, |inverse| inverse * right)
 }
@@ -65,18 +73,18 @@ impl OwnFrame {
             return None;
         }
         let (mut normal, mut right) = (SMatrix::<f64, 8, 8>::zeros(), SMatrix::<f64, 8, 3>::zeros());
-        for ray in even_directions(camera) {
-            let by_lens = ray_by_lens(camera, &ray);
+        let rays = rays_by_lens(camera);
+        for (cross, by_lens) in &rays {
             let like_a_turn = SMatrix::<f64, 3, 8>::from_fn(|row, column| by_lens[(row, LIKE_A_TURN[column])]);
             normal += like_a_turn.transpose() * like_a_turn;
-            right += like_a_turn.transpose() * ray.vector().cross_matrix();
+            right += like_a_turn.transpose() * cross;
         }
         let solved = normal.cholesky()?.solve(&right);
         let mut lens_by_turn = SMatrix::<f64, LENS_PARAMETERS, 3>::zeros();
         for (row, parameter) in LIKE_A_TURN.into_iter().enumerate() {
             lens_by_turn.row_mut(parameter).copy_from(&solved.row(row));
         }
-        let mut turn_by_lens = common_turn_by_lens(camera);
+        let mut turn_by_lens = common_turn(&rays);
         turn_by_lens.row_mut(2).fill(0.0);
         Some(Self { turn_by_lens, lens_by_turn })
     }
