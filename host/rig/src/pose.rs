@@ -160,6 +160,7 @@ impl Rig {
         });
         let together = [left, right].map(|joints| joints.timing.clone());
         let (mut rotation, mut translation) = (pose.rotation_sigma.rad(), pose.translation_sigma.mm());
+        let mut by_joints = Matrix6::zeros();
         for counts in alone.chain([together]) {
             let moved = [0, 1].map(|side| {
                 let steps = self.axes.iter().zip(&counts[side]).map(|(axis, counts)| {
@@ -173,8 +174,9 @@ impl Rig {
             rotation = rotation.hypot(change.rotation().angle());
             translation = translation.hypot(change.origin().mm().norm());
             let twist = difference(&exact.1, &after);
-            pose.shared = pose.shared.plus_pose(&(twist * twist.transpose()));
+            by_joints += twist * twist.transpose();
         }
+        pose.shared = pose.shared.plus_pose(&by_joints);
         pose.rotation_sigma = Angle::from_rad(rotation);
         pose.translation_sigma = Length::from_mm(translation);
         self.add_return(&mut pose);
