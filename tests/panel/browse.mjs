@@ -15,6 +15,11 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
   const separation = (page) => page.evaluate(() => Number(/now (-?[\d.]+)/.exec(document.querySelectorAll('#axes .now')[1].textContent)[1]));
   const mode = (page, name) => holds(page, (name) => document.querySelector('#modes [aria-pressed="true"]')?.textContent === name, name);
   const drives = (page) => holds(page, () => document.querySelector('#who').textContent.startsWith('you drive'));
+  // A browser beside much other work may be silent for so long that its page drives no longer: it asks again.
+  const keeps = async (page) => {
+    if (!(await text(page, '#who')).startsWith('you drive')) await page.click('#take');
+    await drives(page);
+  };
   // Numbers of pixels of the cloud's canvas that are neither ground nor grid.
   const coloured = (page) => page.evaluate(() => {
     const canvas = document.querySelector('#cloud');
@@ -84,6 +89,7 @@ await browse(executablePath, async ({ open, holds, text, shot, passed, serious }
 
   // A second page, a phone, watches, asks, and takes over.
   const second = await open(url, { viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true, colorScheme: 'light' });
+  await keeps(first);
   await holds(second, () => /page \d+ drives, you watch/.test(document.querySelector('#who').textContent));
   await holds(second, () => document.querySelector('#home').disabled); // Who watches does not drive.
   assert.ok(await second.isEnabled('#stop'), 'everybody may stop');

@@ -40,7 +40,7 @@ impl Rig {
         if field == LensField::Extrapolated && !known { Err(UnknownLensErrors) } else { Ok(self.with_field(field)) }
     }
 
-    /// The covariance of the parameters of the lens on `side` in the frame of its rays ([`super::own_frame`]), in the order of
+    /// The covariance of the parameters of the lens on `side` in the frame of its rays, in the order of
     /// [`LENS_PARAMETERS`]; `None` where the file states none.
     #[must_use]
     pub fn lens_covariance(&self, side: Side) -> Option<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>> {
