@@ -187,3 +187,24 @@ fn a_displaced_lens_moves_the_light_on_its_axis_as_that_beside_it() {
         assert!(moved > 0.5, "{moved} px");
     }
 }
+
+/// What is kept for the next photograph is of this very lens, and of no one that it was made from.
+#[test]
+fn kept_directions_are_those_of_the_lens_at_hand() {
+    let pixels: Vec<[f64; 2]> = (0..40).map(|i| [25.0 * f64::from(i) + 100.0, 500.0]).collect();
+    let whole = lens(BuiltIn::Sigma8);
+    let kept_first = |lens: &TracedLens| lens.kept_directions(&pixels);
+    kept_first(&whole);
+    let changed = [
+        whole.clone().by_centroid(),
+        whole.clone().displaced(&MOUNTED).expect("a lens"),
+        whole.before_part([40, 30], ImageSize { width: 900, height: 900 }),
+        whole.clone().bare(),
+        whole,
+    ];
+    let bits = |rays: &[[f64; 3]]| rays.as_flattened().iter().map(|number| number.to_bits()).collect::<Vec<_>>();
+    for lens in &changed {
+        assert!(bits(&kept_first(lens)) == bits(&lens.directions(&pixels)), "{lens:?}");
+        assert!(bits(&lens.kept_directions(&pixels[..7])) == bits(&lens.directions(&pixels[..7])));
+    }
+}
