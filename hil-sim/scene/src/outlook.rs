@@ -102,7 +102,7 @@ impl Outlook {
 
     /// The numbers of the cells of `directions` of any length.
     #[inline(always)]
-    pub fn cells<const N: usize>(&self, directions: &Singles<N>) -> [usize; N] {
+    pub fn cells<const N: usize>(&self, directions: &Singles<N>) -> [u32; N] {
         let [x, y, z] = directions;
         let mut cells = [0; N];
         for i in 0..N {
@@ -121,14 +121,14 @@ impl Outlook {
             let [column, row] = [first, second]
                 .map(|across| (across * scale + 0.5 * CELLS as f32).clamp(0.0, CELLS as f32 - 1.0).trunc());
             let face = 2.0 * axis + if along < 0.0 { 1.0 } else { 0.0 };
-            cells[i] = ((face * CELLS as f32 + row) * CELLS as f32 + column) as u32 as usize;
+            cells[i] = ((face * CELLS as f32 + row) * CELLS as f32 + column) as u32;
         }
         cells
     }
 
     /// The shapes that the rays which count may meet, nearest first; `cells` are those of their directions.
     #[inline(always)]
-    pub fn candidates<const N: usize>(&self, counts: &[bool; N], cells: &[usize; N]) -> Candidates<'_, N> {
+    pub fn candidates<const N: usize>(&self, counts: &[bool; N], cells: &[u32; N]) -> Candidates<'_, N> {
         let (mut left, mut lists, mut count) = (*counts, [[].as_slice(); N], 0);
         if let Some(cell) = self.cell_of_all(counts, cells) {
             (lists[0], count, left) = (self.list(cell), 1, [false; N]);
@@ -141,17 +141,18 @@ impl Outlook {
     }
 
     #[inline(always)]
-    fn list(&self, cell: usize) -> &[Candidate] {
+    fn list(&self, cell: u32) -> &[Candidate] {
+        let cell = cell as usize;
         &self.candidates[self.begins[cell] as usize..self.begins[cell + 1] as usize]
     }
 
     /// The cell whose list holds the shapes of all these cells, if they are near enough to each other on one face.
     #[inline(always)]
-    fn cell_of_all<const N: usize>(&self, counts: &[bool; N], cells: &[usize; N]) -> Option<usize> {
+    fn cell_of_all<const N: usize>(&self, counts: &[bool; N], cells: &[u32; N]) -> Option<u32> {
         let (mut first, mut last) = ([u32::MAX; 2], [0; 2]);
         for i in 0..N {
             // Rows are counted over all faces.
-            let place = [cells[i] as u32 % CELLS as u32, cells[i] as u32 / CELLS as u32];
+            let place = [cells[i] % CELLS as u32, cells[i] / CELLS as u32];
             for axis in 0..2 {
                 let (low, high) = if counts[i] { (place[axis], place[axis]) } else { (u32::MAX, 0) };
                 first[axis] = first[axis].min(low);
@@ -160,7 +161,7 @@ impl Outlook {
         }
         let is_near = |axis: usize| first[axis] <= last[axis] && last[axis] - first[axis] <= self.overlap as u32;
         let is_one_face = first[1] / CELLS as u32 == last[1] / CELLS as u32;
-        (is_near(0) && is_near(1) && is_one_face).then_some(first[1] as usize * CELLS + first[0] as usize)
+        (is_near(0) && is_near(1) && is_one_face).then_some(first[1] * CELLS as u32 + first[0])
     }
 }
 

@@ -8,16 +8,15 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use image::RgbImage;
-use multiversion::multiversion;
 use rayon::prelude::*;
 use vergence_vision::{Angle, Camera, ImageSize, Transform, World};
 
 use crate::Optics;
 use crate::lens::Lens;
-use crate::packet::{QUICK_LANES, Singles};
+use crate::packet::QUICK_LANES;
 use crate::quick_bundle::{Block, QuickBundle};
 use crate::quick_canvas::{Canvas, CanvasRows};
-use crate::quick_edges::edge_lights;
+use crate::quick_edges::EdgeRows;
 use crate::quick_eye::{Eye, TileEyes};
 use crate::quick_glance::Glance;
 use crate::quick_sensor::develop;
@@ -28,7 +27,7 @@ use crate::texture::Rgb;
 use crate::texture_noise::mix64;
 
 /// Number of rows that one task renders: some tiles.
-pub const BAND: usize = TILE;
+pub const BAND: usize = 2 * TILE;
 
 /// Rows and columns of pixels whose rays are followed side by side: what is side by side shows few surfaces.
 pub const TILE: usize = 8;
@@ -47,6 +46,8 @@ pub struct RayTable {
     pub(crate) spots: Vec<f32>,
     /// How far along the axis from the camera's origin light crosses it, mm.
     pub(crate) pupils: Vec<f32>,
+    /// The cosine of the largest angle of light to the axis.
+    pub(crate) least_z: f32,
     /// Of earlier images: what the next one shows too, or at least its memory, since new memory takes the system a tenth of an image's time.
     kept: Arc<Mutex<Vec<Glance>>>,
 }
@@ -79,6 +80,7 @@ impl RayTable {
             exposures,
             spots,
             pupils,
+            least_z: lens.theta_max().rad().cos() as f32,
             kept: Arc::default(),
         }
     }
@@ -119,7 +121,7 @@ pub fn render_quick(
         return RgbImage::new(table.size.width, table.size.height);
     }
     let poses: Vec<_> = (0..table.size.height).into_par_iter().map(world_from_camera).collect();
-    let (eyes, lens): (Vec<Eye>, _) = (poses.iter().map(Eye::new).collect(), view.camera.rays());
+    let eyes: Vec<Eye> = poses.iter().map(Eye::new).collect();
     let kept = table.kept.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let mut glance = match kept {
         Some(glance) if glance.is_of(view.scene, &poses) => glance,
@@ -128,11 +130,11 @@ pub fn render_quick(
     let Glance { canvas, sight, .. } = &mut glance;
     let bands = eyes.par_chunks(BAND).enumerate();
     let mut edges: Vec<_> = bands
-        .map_init(QuickBundle::default, |bundle, (band, eyes)| {
-            edge_lights((view, table, &lens, seed), sight, bundle, (canvas, band * BAND, eyes))
+        .map_init(EdgeRows::default, |rows, (band, eyes)| {
+            rows.lights((view, table, seed), sight, (canvas, band * BAND, eyes))
         })
         .collect();
-    let swap = |canvas: &mut Canvas, (place, light): &mut ([usize; 2], Rgb)| canvas.swap_light(*place, light);
+    let swap = |canvas: &mut Canvas, (pixel, light): &mut (usize, Rgb)| canvas.swap_light(*pixel, light);
     edges.iter_mut().flatten().for_each(|edge| swap(canvas, edge));
     let image = develop(canvas, table, view.optics, !mix64(seed));
     // Each image has its own rays at edges.
@@ -182,33 +184,21 @@ fn look(
             }
         }
     }
-    bundle.follow(view.scene, sight, |_, _| true);
+    bundle.follow(view.scene, sight, |_, _| None);
     for block in bundle.blocks() {
         let [left, top] = [block.owners[0] as usize % width, block.owners[0] as usize / width];
-        let levels = levels(&block.lights);
         let (columns, height) = (TILE.min(width - left), TILE.min(rows.height() - top));
         for row in 0..height {
             let lanes = row * TILE..row * TILE + columns;
-            let ([red, green, blue, shown], surfaces) = rows.pixels([left, top + row], columns);
+            let (light, surfaces) = rows.pixels([left, top + row], columns);
             // Outside the field there is no light.
-            for (shown, light) in [red, green, blue].into_iter().zip(&block.lights) {
+            for (shown, light) in light.into_iter().zip(&block.lights) {
                 copy_row(shown, &light[lanes.clone()]);
             }
-            copy_row(shown, &levels[lanes.clone()]);
             copy_row(surfaces, &block.surfaces[lanes]);
         }
     }
     bundle.clear();
-}
-
-/// The square roots of the means of colours, by the instructions of this machine: the same numbers on all.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
-fn levels(lights: &Singles<QUICK_LANES>) -> [f32; QUICK_LANES] {
-    let ([red, green, blue], mut levels) = (lights, [0.0; QUICK_LANES]);
-    for i in 0..QUICK_LANES {
-        levels[i] = ((red[i] + green[i] + blue[i]) / 3.0).sqrt();
-    }
-    levels
 }
 
 /// Copies a row of a tile, or what of it is within the image: of a whole one in one instruction.

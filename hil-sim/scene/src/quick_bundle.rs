@@ -4,9 +4,13 @@
 
 use crate::Scene;
 use crate::packet::{Packet, QUICK_LANES, Singles};
-use crate::radiance::glance_many;
+use crate::radiance::{glance_many, glance_some};
 use crate::sight::{Sight, first_many};
+use crate::texture::Rgb;
 use crate::trace::NOTHING;
+
+/// Rays of one pixel at most.
+pub const MOST_OF_PIXEL: usize = 16;
 
 /// Rays in the order in which they were gathered.
 #[derive(Debug, Default)]
@@ -16,6 +20,10 @@ pub struct QuickBundle {
     used: usize,
     /// Rays of the last block in use.
     in_last: usize,
+    /// Surfaces, and the numbers of rays that meet them, beside which others meet other surfaces.
+    alone: Vec<[u32; 2]>,
+    /// The same, surface by surface.
+    sorted: Vec<[u32; 2]>,
 }
 
 /// Rays that are followed side by side, and what they found.
@@ -49,33 +57,48 @@ impl Block {
         lights: [[0.0; QUICK_LANES]; 3],
     };
 
-    /// Puts ray `from` of another block at `to`.
-    fn take(&mut self, to: usize, other: &Self, from: usize) {
-        for axis in 0..3 {
-            self.rays.origin[axis][to] = other.rays.origin[axis][from];
-            self.rays.direction[axis][to] = other.rays.direction[axis][from];
-        }
-        (self.rays.counts[to], self.spreads[to], self.ranges[to]) = (true, other.spreads[from], other.ranges[from]);
-    }
-
     fn give_light(&mut self, scene: &Scene, surface: u32) {
         self.lights = glance_many(scene, surface, &self.rays, [&self.ranges, &self.spreads]);
     }
 }
 
 impl QuickBundle {
-    /// Adds a ray of a pixel, in the world.
-    pub fn push(&mut self, owner: usize, origin: [f32; 3], direction: [f32; 3], spread: f32) {
-        if self.used == 0 || self.in_last == QUICK_LANES {
-            self.add_block();
-            self.in_last = 0;
+    /// Adds rays of a pixel from one place in the world: the first `count` of these directions. Tells the number of the first of them.
+    pub fn push(
+        &mut self,
+        owner: usize,
+        origin: [f32; 3],
+        (directions, count): (&Singles<MOST_OF_PIXEL>, usize),
+        spread: f32,
+    ) -> usize {
+        let first = self.used.saturating_sub(1) * QUICK_LANES + self.in_last;
+        let mut from = 0;
+        while from < count {
+            if self.used == 0 || self.in_last == QUICK_LANES {
+                self.add_block();
+                self.in_last = 0;
+            }
+            let (block, at) = (&mut self.blocks[self.used - 1], self.in_last);
+            let some = (count - from).min(QUICK_LANES - at);
+            for i in 0..some {
+                for axis in 0..3 {
+                    block.rays.origin[axis][at + i] = origin[axis];
+                    block.rays.direction[axis][at + i] = directions[axis][from + i];
+                }
+                block.rays.counts[at + i] = true;
+                block.owners[at + i] = owner as u32;
+                block.spreads[at + i] = spread;
+            }
+            (self.in_last, from) = (at + some, from + some);
         }
-        let (block, at) = (&mut self.blocks[self.used - 1], self.in_last);
-        for axis in 0..3 {
-            (block.rays.origin[axis][at], block.rays.direction[axis][at]) = (origin[axis], direction[axis]);
-        }
-        (block.rays.counts[at], block.owners[at], block.spreads[at]) = (true, owner as u32, spread);
-        self.in_last += 1;
+        first
+    }
+
+    /// The light of a ray by its number.
+    #[inline]
+    pub fn light(&self, ray: usize) -> Rgb {
+        let ([red, green, blue], lane) = (&self.blocks[ray / QUICK_LANES].lights, ray % QUICK_LANES);
+        [red[lane], green[lane], blue[lane]]
     }
 
     /// Adds rays that are side by side, and which the caller sets: those that do not count have any numbers.
@@ -101,13 +124,13 @@ impl QuickBundle {
 
     /// Takes all rays away.
     pub const fn clear(&mut self) {
-        self.used = 0;
+        (self.used, self.in_last) = (0, 0);
     }
 
-    /// Follows the rays, and notes in the blocks what they found. `wants_light(owner, surface)` tells whether a ray that meets this surface
-    /// needs its light, which takes most of the time.
-    pub fn follow(&mut self, scene: &Scene, sight: &Sight, wants_light: impl Fn(usize, u32) -> bool) {
-        let mut alone = Vec::new();
+    /// Follows the rays, and notes in the blocks what they found. `known(owner, surface)` is the light of a ray that meets this surface, if it is
+    /// known: to find it takes most of the time.
+    pub fn follow(&mut self, scene: &Scene, sight: &Sight, known: impl Fn(usize, u32) -> Option<Rgb>) {
+        self.alone.clear();
         for (number, block) in self.blocks[..self.used].iter_mut().enumerate() {
             (block.surfaces, block.ranges) = first_many(sight, &block.rays);
             for (lights, backdrop) in block.lights.iter_mut().zip(scene.backdrop) {
@@ -116,8 +139,11 @@ impl QuickBundle {
                 }
             }
             let mut wanted = [false; QUICK_LANES];
-            for (wanted, (surface, owner)) in wanted.iter_mut().zip(block.surfaces.iter().zip(&block.owners)) {
-                *wanted = *surface != NOTHING && wants_light(*owner as usize, *surface);
+            for (i, wanted) in wanted.iter_mut().enumerate().filter(|(i, _)| block.surfaces[*i] != NOTHING) {
+                match known(block.owners[i] as usize, block.surfaces[i]) {
+                    Some(light) => (0..3).for_each(|channel| block.lights[channel][i] = light[channel]),
+                    None => *wanted = true,
+                }
             }
             let first = wanted.iter().position(|wanted| *wanted).map(|first| block.surfaces[first]);
             let Some(surface) = first else { continue };
@@ -126,30 +152,65 @@ impl QuickBundle {
                 continue;
             }
             for i in (0..QUICK_LANES).filter(|&i| wanted[i]) {
-                alone.push(u64::from(block.surfaces[i]) << 32 | (number * QUICK_LANES + i) as u64);
+                self.alone.push([block.surfaces[i], (number * QUICK_LANES + i) as u32]);
             }
         }
-        self.light_alone(scene, alone);
+        self.light_alone(scene);
     }
 
-    /// Light for rays beside which others meet other surfaces: those of one surface together. The upper half of each number is the
-    /// surface's, the lower half the ray's.
-    fn light_alone(&mut self, scene: &Scene, mut rays: Vec<u64>) {
-        rays.sort_unstable();
-        for of_surface in rays.chunk_by(|a, b| a >> 32 == b >> 32) {
+    /// Light for rays beside which others meet other surfaces: those of one surface together.
+    fn light_alone(&mut self, scene: &Scene) {
+        sort_by_surface(&self.alone, &mut self.sorted, scene.solids.len());
+        let (blocks, sorted) = (&mut self.blocks, &self.sorted);
+        for of_surface in sorted.chunk_by(|[a, _], [b, _]| a == b) {
+            let surface = of_surface[0][0];
             for members in of_surface.chunks(QUICK_LANES) {
-                let mut together = Block::EMPTY;
-                for (to, ray) in members.iter().enumerate() {
-                    let ray = *ray as u32 as usize;
-                    together.take(to, &self.blocks[ray / QUICK_LANES], ray % QUICK_LANES);
-                }
-                together.give_light(scene, (members[0] >> 32) as u32);
-                for (from, ray) in members.iter().enumerate() {
-                    let ray = *ray as u32 as usize;
-                    let (block, to) = (&mut self.blocks[ray / QUICK_LANES], ray % QUICK_LANES);
-                    (0..3).for_each(|channel| block.lights[channel][to] = together.lights[channel][from]);
+                if members.len() > QUICK_LANES / 2 {
+                    light_together(blocks, members, |rays, ranges| glance_many(scene, surface, rays, ranges));
+                } else {
+                    light_together(blocks, members, |rays, ranges| glance_some(scene, surface, rays, ranges));
                 }
             }
         }
+    }
+}
+
+/// Light for these of the rays, which all meet one surface.
+fn light_together<const N: usize>(
+    blocks: &mut [Block],
+    members: &[[u32; 2]],
+    lights: impl Fn(&Packet<f32, N>, [&[f32; N]; 2]) -> Singles<N>,
+) {
+    let mut rays = Packet { origin: [[0.0; N]; 3], direction: [[0.0; N]; 3], counts: [false; N] };
+    let (mut ranges, mut spreads) = ([0.0; N], [0.0; N]);
+    let place = |ray: u32| (ray as usize / QUICK_LANES, ray as usize % QUICK_LANES);
+    for (to, [_, ray]) in members.iter().enumerate() {
+        let (block, from) = place(*ray);
+        let block = &blocks[block];
+        for axis in 0..3 {
+            rays.origin[axis][to] = block.rays.origin[axis][from];
+            rays.direction[axis][to] = block.rays.direction[axis][from];
+        }
+        (rays.counts[to], ranges[to], spreads[to]) = (true, block.ranges[from], block.spreads[from]);
+    }
+    let lights = lights(&rays, [&ranges, &spreads]);
+    for (from, [_, ray]) in members.iter().enumerate() {
+        let (block, to) = place(*ray);
+        let block = &mut blocks[block];
+        (0..3).for_each(|channel| block.lights[channel][to] = lights[channel][from]);
+    }
+}
+
+/// Puts rays in the order of their surfaces, of which there are so many, and otherwise leaves their order.
+fn sort_by_surface(rays: &[[u32; 2]], sorted: &mut Vec<[u32; 2]>, surfaces: usize) {
+    let mut next = vec![0_u32; surfaces + 1];
+    rays.iter().for_each(|[surface, _]| next[*surface as usize + 1] += 1);
+    (1..next.len()).for_each(|surface| next[surface] += next[surface - 1]);
+    sorted.clear();
+    sorted.resize(rays.len(), [0; 2]);
+    for ray in rays {
+        let next = &mut next[ray[0] as usize];
+        sorted[*next as usize] = *ray;
+        *next += 1;
     }
 }

@@ -12,7 +12,6 @@ use crate::trace::NOTHING;
 pub struct Canvas {
     width: usize,
     light: [Vec<f32>; 3],
-    levels: Vec<f32>,
     surfaces: Vec<u32>,
 }
 
@@ -21,8 +20,6 @@ pub struct CanvasRows<'a> {
     width: usize,
     /// Red, green and blue; none outside the field.
     light: [&'a mut [f32]; 3],
-    /// The square root of the mean of the colours.
-    levels: &'a mut [f32],
     /// Numbers of the surfaces; [`NOTHING`] where nothing is met, and outside the field.
     surfaces: &'a mut [u32],
 }
@@ -31,7 +28,7 @@ impl Canvas {
     /// Of so many columns and rows, at least one.
     pub fn new(width: usize, height: usize) -> Self {
         let dark = || vec![0.0; width * height];
-        Self { width, light: [dark(), dark(), dark()], levels: dark(), surfaces: vec![NOTHING; width * height] }
+        Self { width, light: [dark(), dark(), dark()], surfaces: vec![NOTHING; width * height] }
     }
 
     /// Number of columns.
@@ -52,40 +49,41 @@ impl Canvas {
         &self.light[channel][y * self.width..][..self.width]
     }
 
-    /// The square roots of the means of a row's colours.
-    #[inline]
-    pub fn levels(&self, y: usize) -> &[f32] {
-        &self.levels[y * self.width..][..self.width]
-    }
-
     /// Numbers of a row's surfaces; [`NOTHING`] where nothing is met, and outside the field.
     #[inline]
     pub fn surfaces(&self, y: usize) -> &[u32] {
         &self.surfaces[y * self.width..][..self.width]
     }
 
-    /// The light of a pixel.
+    /// The light of a pixel, of which the first one of the second row has the number `width`.
     #[inline]
-    pub fn light_at(&self, [x, y]: [usize; 2]) -> Rgb {
-        let (at, [red, green, blue]) = (y * self.width + x, &self.light);
-        [red[at], green[at], blue[at]]
+    pub fn light_at(&self, pixel: usize) -> Rgb {
+        let [red, green, blue] = &self.light;
+        [red[pixel], green[pixel], blue[pixel]]
     }
 
-    /// Exchanges the light of a pixel for another, and neither its level nor its surface.
-    pub fn swap_light(&mut self, [x, y]: [usize; 2], light: &mut Rgb) {
+    /// The number of a pixel's surface.
+    #[inline]
+    pub fn surface_at(&self, pixel: usize) -> u32 {
+        self.surfaces[pixel]
+    }
+
+    /// Exchanges the light of a pixel for another, and not its surface.
+    pub fn swap_light(&mut self, pixel: usize, light: &mut Rgb) {
         for (channel, light) in self.light.iter_mut().zip(light) {
-            std::mem::swap(&mut channel[y * self.width + x], light);
+            std::mem::swap(&mut channel[pixel], light);
         }
     }
 
     /// The canvas in parts of so many rows, from above.
     pub fn par_bands(&mut self, rows: usize) -> impl IndexedParallelIterator<Item = CanvasRows<'_>> {
         let (width, [red, green, blue]) = (self.width, &mut self.light);
-        let [red, green, blue, levels] =
-            [red, green, blue, &mut self.levels].map(|plane| plane.par_chunks_mut(width * rows));
-        let planes = red.zip(green).zip(blue).zip(levels);
-        planes.zip(self.surfaces.par_chunks_mut(width * rows)).map(move |((((red, green), blue), levels), surfaces)| {
-            CanvasRows { width, light: [red, green, blue], levels, surfaces }
+        let [red, green, blue] = [red, green, blue].map(|plane| plane.par_chunks_mut(width * rows));
+        let surfaces = self.surfaces.par_chunks_mut(width * rows);
+        red.zip(green).zip(blue).zip(surfaces).map(move |(((red, green), blue), surfaces)| CanvasRows {
+            width,
+            light: [red, green, blue],
+            surfaces,
         })
     }
 }
@@ -96,11 +94,11 @@ impl CanvasRows<'_> {
         self.surfaces.len() / self.width
     }
 
-    /// Pixels of a row from column `x` on, as many as `count`: red, green, blue and levels, and the surfaces.
+    /// Pixels of a row from column `x` on, as many as `count`: red, green and blue, and the surfaces.
     #[inline]
-    pub fn pixels(&mut self, [x, y]: [usize; 2], count: usize) -> ([&mut [f32]; 4], &mut [u32]) {
+    pub fn pixels(&mut self, [x, y]: [usize; 2], count: usize) -> ([&mut [f32]; 3], &mut [u32]) {
         let (at, [red, green, blue]) = (y * self.width + x..y * self.width + x + count, &mut self.light);
-        let planes = [red, green, blue, &mut self.levels].map(|plane| &mut plane[at.clone()]);
+        let planes = [red, green, blue].map(|plane| &mut plane[at.clone()]);
         (planes, &mut self.surfaces[at])
     }
 }

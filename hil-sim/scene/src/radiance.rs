@@ -19,6 +19,17 @@ pub fn glance_many(
     scene.glances(surface, rays, ranges, spreads)
 }
 
+/// [`glance_many`] of half as many rays.
+#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+avx2", "x86_64+avx2"))]
+pub fn glance_some(
+    scene: &Scene,
+    surface: u32,
+    rays: &Packet<f32, { QUICK_LANES / 2 }>,
+    [ranges, spreads]: [&[f32; QUICK_LANES / 2]; 2],
+) -> Singles<{ QUICK_LANES / 2 }> {
+    scene.glances(surface, rays, ranges, spreads)
+}
+
 /// Where rays meet one surface.
 pub struct Contacts<'a, T, const N: usize> {
     /// Those of them that count, and their directions in the world.
