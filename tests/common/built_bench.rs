@@ -77,13 +77,14 @@ pub fn mounted(rig: Rig, dice: &mut Dice) -> Rig {
         let share = 0.5 + 0.5 * dice.uniform();
         let mut draw = |sigma: f64| share * sigma * dice.normal();
         let mut along = || {
-            let p = draw(6.7e-4);
-            let square = -1.7 * p + draw(8.2e-4);
-            [p, square, 0.4 * p + 0.57 * square + draw(3.7e-4)]
+            let p = draw(6.2e-4);
+            let square = -1.5 * p + draw(8.4e-4);
+            let fourth = 0.38 * p + 0.32 * square + draw(1.7e-4);
+            [p, square, fourth, 0.073 * p + 0.027 * square - 0.60 * fourth + draw(4.2e-5)]
         };
-        let ([p1, s0, s1], [p2, s2, s3]) = (along(), along());
+        let ([p1, s0, s1, p3], [p2, s2, s3, p4]) = (along(), along());
         let pupil = Pupil::from_mm([1.5 + 1.5 * dice.uniform(), 0.3 * dice.normal()]);
-        let asymmetry = Asymmetry::from_array([p1, p2, s0, s1, s2, s3]);
+        let asymmetry = Asymmetry::from_array([p1, p2, s0, s1, s2, s3, p3, p4]);
         lens.with_pupil(pupil).and_then(|lens| lens.with_asymmetry(asymmetry)).expect("a lens")
     };
     let (left_camera, right_camera) = (lens(rig.left_camera), lens(rig.right_camera));

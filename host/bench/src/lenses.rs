@@ -162,7 +162,7 @@ fn all() -> Result<Vec<(&'static str, KannalaBrandt)>, BenchError> {
     let k = [599.1, -31.1532, 2.45631, -1.13829, 0.11982];
     let centre = Pixel { u: 1024.0, v: 1024.0 };
     let own = KannalaBrandt::new(k, 1.01, centre, Angle::from_deg(98.0), SIZE).map_err(|error| refused(&error))?;
-    let by = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4] };
+    let by = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4], growth: [1e-4, -5e-5] };
     let displaced = own.with_asymmetry(by).map_err(|error| refused(&error))?;
     let longer = own.with_further_terms([4e-5, -3e-6]).map_err(|error| refused(&error))?;
     let pupil = Pupil::from_mm([2.77, 0.056]);

@@ -20,11 +20,13 @@ const FIELD: Angle = Angle::from_deg(98.0);
 /// f, c, k, e0 and e1, decentring, thin prism: about those of a mounted Sigma lens. A lower level has the first of them.
 const LENS: [f64; LENS_PARAMETERS] = [
     599.1, 600.2, 1021.0, 1027.5, -0.052, 0.0041, -0.0019, 0.0002, 2.8, 0.7, 4e-4, -3e-4, 5e-4, -1e-4, -4e-4, 2e-4,
-    0.0, 0.0,
+    0.0, 0.0, 5e-5, -3e-5,
 ];
 /// Standard deviations of these.
-const SIGMAS: [f64; LENS_PARAMETERS] =
-    [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.05, 0.05, 2e-5, 2e-5, 5e-5, 5e-5, 5e-5, 5e-5, 0.0, 0.0];
+const SIGMAS: [f64; LENS_PARAMETERS] = [
+    0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.05, 0.05, 2e-5, 2e-5, 5e-5, 5e-5, 5e-5, 5e-5, 0.0, 0.0, 1e-5,
+    1e-5,
+];
 const POSE_SIGMAS: [f64; 6] = [1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2];
 /// A level may take so many times as long as one centre.
 const LIMIT: f64 = 1.5;

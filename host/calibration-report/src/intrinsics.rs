@@ -247,7 +247,7 @@ impl<'a> Report<'a> {
         let mut rows: Vec<Row> = names
             .iter()
             .flatten()
-            .chain(&[("k5", ""), ("k6", "")])
+            .chain(&[("k5", ""), ("k6", ""), ("p3", ""), ("p4", "")])
             .zip(found.lens().to_array())
             .enumerate()
             .filter(|(index, _)| estimated(*index))
@@ -262,7 +262,7 @@ impl<'a> Report<'a> {
                            σ comes from the noise of the corners, with target poses free. k1 to k4 depend on each \
                            other: two calibrations may differ in them and agree in every ray. Compare rays, not coefficients. \
                            The ray at θ starts (e0 + e1·θ²)·(θ / sin θ − 1) ahead of the origin. p and s move its image m, in focal \
-                           lengths from the principal point, by 2 (m·p) m + |m|² p + (s0 |m|² + s1 |m|⁴, s2 |m|² + s3 |m|⁴).";
+                           lengths from the principal point, by 2 (m·P) m + |m|² P with P = (p1, p2) + |m|² (p3, p4), and (s0 |m|² + s1 |m|⁴, s2 |m|² + s3 |m|⁴).";
         let pupil = format!("By the views {}.", pupil_in_words(&found.pupil));
         let steps: String =
             found.steps.iter().map(|step| note(&format!("By the views {}.", step_in_words(step)))).collect();

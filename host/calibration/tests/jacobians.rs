@@ -10,7 +10,7 @@ use vergence_vision::{LENS_PARAMETERS, Point};
 /// The projection of Kannala and Brandt, eq. 6, with a pupil that moves and elements off the axis, written down once more for numbers that
 /// carry a derivative.
 fn projected(lens: [Dual64; LENS_PARAMETERS], [x, y, z]: [Dual64; 3]) -> [Dual64; 2] {
-    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6] = lens;
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4] = lens;
     let rho = (x * x + y * y).sqrt();
     let mut theta = rho.atan2(z);
     for _ in 0..8 {
@@ -24,7 +24,9 @@ fn projected(lens: [Dual64; LENS_PARAMETERS], [x, y, z]: [Dual64; 3]) -> [Dual64
     let t = theta * theta;
     let radius = theta * ((((((k6 * t + k5) * t + k4) * t + k3) * t + k2) * t + k1) * t + 1.0);
     let (m, n) = (radius * x / rho, radius * y / rho);
-    let (square, along) = (m * m + n * n, (m * p1 + n * p2) * 2.0);
+    let square = m * m + n * n;
+    let (p1, p2) = (p3 * square + p1, p4 * square + p2);
+    let along = (m * p1 + n * p2) * 2.0;
     let (u, v) = (s1 * square + s0 + p1, s3 * square + s2 + p2);
     [cx + fx * (along * m + m + u * square), cy + fy * (along * n + n + v * square)]
 }
@@ -38,17 +40,17 @@ fn lens_and_point() -> impl Strategy<Value = ([f64; LENS_PARAMETERS], [f64; 3])>
         -50.0..1500.0,
         prop::array::uniform4(-0.05..0.05),
         prop_oneof![Just([0.0; 2]), (-1.0..3.0, -0.3..0.3_f64).prop_map(|(e0, e1)| [e0, e1])],
-        prop_oneof![Just([0.0; 6]), prop::array::uniform6(-0.01..0.01)],
+        prop_oneof![Just([0.0; 8]), prop::array::uniform8(-0.01..0.01)],
         prop_oneof![Just([0.0; 2]), prop::array::uniform2(-1e-4..1e-4)],
     );
     let point = (1.0..150.0_f64, -180.0..180.0_f64, 50.0..2000.0);
     (lens, point).prop_map(
         |((fx, aspect, cx, cy, [k1, k2, k3, k4], [e0, e1], asymmetry, [k5, k6]), (theta, phi, range))| {
-            let [p1, p2, s0, s1, s2, s3] = asymmetry;
+            let [p1, p2, s0, s1, s2, s3, p3, p4] = asymmetry;
             let (sin, cos) = theta.to_radians().sin_cos();
             let (sin_phi, cos_phi) = phi.to_radians().sin_cos();
             let point = [range * sin * cos_phi, range * sin * sin_phi, range * cos];
-            ([fx, fx * aspect, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6], point)
+            ([fx, fx * aspect, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4], point)
         },
     )
 }
@@ -100,8 +102,10 @@ proptest! {
 
 #[test]
 fn on_the_axis_the_projection_is_the_principal_point() {
-    let lens =
-        lens([300.0, 310.0, 500.0, 400.0, 0.01, 0.0, 0.0, 0.0, 2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4, -1e-5]);
+    let lens = lens([
+        300.0, 310.0, 500.0, 400.0, 0.01, 0.0, 0.0, 0.0, 2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4, -1e-5, 1e-3,
+        -2e-3,
+    ]);
     let reprojection = reproject(lens, &Point::from_mm([0.0, 0.0, 200.0].into())).unwrap();
     assert!(close(reprojection.pixel, [500.0, 400.0], 1.0));
     assert!(close(reprojection.by_point[0], [1.5, 0.0], 1.0));
@@ -111,8 +115,10 @@ fn on_the_axis_the_projection_is_the_principal_point() {
 
 #[test]
 fn the_centre_and_straight_behind_have_no_projection() {
-    let lens =
-        lens([300.0, 310.0, 500.0, 400.0, 0.01, 0.0, 0.0, 0.0, 2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4, -1e-5]);
+    let lens = lens([
+        300.0, 310.0, 500.0, 400.0, 0.01, 0.0, 0.0, 0.0, 2.0, 0.1, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4, -1e-5, 1e-3,
+        -2e-3,
+    ]);
     for point in [[0.0; 3], [0.0, 0.0, -10.0], [f64::NAN, 0.0, 1.0]] {
         assert_eq!(reproject(lens, &Point::from_mm(point.into())), None);
     }

@@ -14,8 +14,10 @@ use vergence_vision::{Angle, Camera, ImageSize, LENS_PARAMETERS, Pixel, Point};
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
 /// With a pupil that moves, as real lenses have.
-const LENS: [f64; LENS_PARAMETERS] =
-    [599.1, 600.2, 1021.0, 1027.5, -0.052, 0.0041, -0.0019, 0.0002, 2.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+const LENS: [f64; LENS_PARAMETERS] = [
+    599.1, 600.2, 1021.0, 1027.5, -0.052, 0.0041, -0.0019, 0.0002, 2.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    0.0, 0.0,
+];
 const NOISE_PX: f64 = 0.1;
 /// Of 7 x 5 corners at 30 mm.
 const HALF_MM: [f64; 2] = [90.0, 60.0];

@@ -21,21 +21,23 @@ type Shared = SVector<f64, SHARED_PARAMETERS>;
 /// Lens parameters in the order of calibrations, and the error of each in pixels or without unit.
 const LENS: [f64; LENS_PARAMETERS] = [
     560.0, 561.0, 1039.5, 1039.5, 0.01, -0.004, 0.001, -0.0002, 2.0, 0.3, 4e-4, -7e-4, 5e-4, -2e-4, 8e-4, 1e-4, -4e-5,
-    3e-6,
+    3e-6, 1e-4, -5e-5,
 ];
-const LENS_SIGMA: [f64; LENS_PARAMETERS] =
-    [0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02, 0.02, 2e-5, 2e-5, 2e-5, 1e-5, 2e-5, 1e-5, 1e-6, 3e-7];
+const LENS_SIGMA: [f64; LENS_PARAMETERS] = [
+    0.05, 0.05, 0.04, 0.04, 2e-4, 3e-4, 2e-4, 5e-5, 0.02, 0.02, 2e-5, 2e-5, 2e-5, 1e-5, 2e-5, 1e-5, 1e-6, 3e-7, 1e-5,
+    1e-5,
+];
 /// Index of the first of the further radial terms.
-const FURTHER: usize = LENS_PARAMETERS - 2;
+const FURTHER: usize = 16;
 const POSE_SIGMA: [f64; 6] = [2e-4, 2e-4, 2e-4, 0.05, 0.05, 0.05];
 
 fn lens_of(parameters: &[f64]) -> KannalaBrandt {
-    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, further @ ..]: [f64; LENS_PARAMETERS] =
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4]: [f64; LENS_PARAMETERS] =
         parameters.try_into().unwrap();
     let camera = OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] };
-    let central = KannalaBrandt::from_opencv_with(camera, further, Angle::from_deg(99.0), SIZE).unwrap();
+    let central = KannalaBrandt::from_opencv_with(camera, [k5, k6], Angle::from_deg(99.0), SIZE).unwrap();
     let moving = central.with_pupil(Pupil::from_mm([e0, e1])).unwrap();
-    moving.with_asymmetry(Asymmetry::from_array([p1, p2, s0, s1, s2, s3])).unwrap()
+    moving.with_asymmetry(Asymmetry::from_array([p1, p2, s0, s1, s2, s3, p3, p4])).unwrap()
 }
 
 /// Lenses and pose with `error` added to all shared parameters.

@@ -82,6 +82,12 @@ pub struct CameraTable {
     /// Coefficient of θ¹³ relative to that of θ.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub radial_k6: f64,
+    /// Decentring p3: how p1 grows with the square of the radius in focal lengths.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tangential_p3: f64,
+    /// Decentring p4: the same of p2.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub tangential_p4: f64,
     /// The model of another program by which the camera is computed. The keys above are then those of the polynomial that comes nearest,
     /// which other programs get, and from which a calibration goes on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -132,8 +138,8 @@ impl CameraTable {
         let OpenCvFisheye { fx, fy, cx, cy, k: [opencv_k1, opencv_k2, opencv_k3, opencv_k4] } = camera.to_opencv();
         let ImageSize { width, height } = camera.size();
         let [pupil_e0_mm, pupil_e1_mm] = camera.pupil().mm();
-        let Asymmetry { tangential: [tangential_p1, tangential_p2], prism } = camera.asymmetry();
-        let [prism_s0, prism_s1, prism_s2, prism_s3] = prism;
+        let [tangential_p1, tangential_p2, prism_s0, prism_s1, prism_s2, prism_s3, tangential_p3, tangential_p4] =
+            camera.asymmetry().to_array();
         let [radial_k5, radial_k6] = camera.further_terms();
         Self {
             size: [width, height],
@@ -157,6 +163,8 @@ impl CameraTable {
             prism_s3,
             radial_k5,
             radial_k6,
+            tangential_p3,
+            tangential_p4,
             model: camera.foreign_model().map(ModelTable::of),
         }
     }
@@ -196,6 +204,7 @@ impl CameraTable {
             .with_asymmetry(Asymmetry {
                 tangential: [self.tangential_p1, self.tangential_p2],
                 prism: [self.prism_s0, self.prism_s1, self.prism_s2, self.prism_s3],
+                growth: [self.tangential_p3, self.tangential_p4],
             })?;
         let Some(ModelTable { name, scale, values }) = &self.model else { return Ok(lens) };
         if !scale.is_finite() || *scale <= 0.0 {
@@ -235,13 +244,13 @@ pub struct CalibrationTable {
     pub covariance: SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>,
 }
 
-/// Reads a covariance of 8 to 18 rows.
+/// Reads a covariance of 8 to 20 rows.
 fn square<'de, D: Deserializer<'de>>(file: D) -> Result<SMatrix<f64, LENS_PARAMETERS, LENS_PARAMETERS>, D::Error> {
     let rows = Vec::<Vec<f64>>::deserialize(file)?;
     let n = rows.len();
     if !(CENTRAL_PARAMETERS..=LENS_PARAMETERS).contains(&n) || rows.iter().any(|row| row.len() != n) {
         return Err(D::Error::custom(
-            "the covariance of a lens has 8 rows of 8 values, and as many more of each as it has parameters beyond opencv_k4: up to 18",
+            "the covariance of a lens has 8 rows of 8 values, and as many more of each as it has parameters beyond opencv_k4: up to 20",
         ));
     }
     if rows.iter().flatten().any(|value| !value.is_finite()) || (0..n).any(|i| rows[i][i] < 0.0) {

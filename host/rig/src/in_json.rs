@@ -81,8 +81,8 @@ pub fn camera_in_words(camera: &KannalaBrandt) -> String {
     let asymmetry = if camera.is_symmetric() {
         String::new()
     } else {
-        let [p1, p2, s0, s1, s2, s3] = camera.asymmetry().to_array();
-        format!("\ntangential {p1:.6} {p2:.6}  prism {s0:.6} {s1:.6} {s2:.6} {s3:.6}")
+        let [p1, p2, s0, s1, s2, s3, p3, p4] = camera.asymmetry().to_array();
+        format!("\ntangential {p1:.6} {p2:.6} {p3:.6} {p4:.6}  prism {s0:.6} {s1:.6} {s2:.6} {s3:.6}")
     };
     let further = if camera.has_further_terms() {
         let [k5, k6] = camera.further_terms();
@@ -117,6 +117,7 @@ pub fn camera_json(camera: &KannalaBrandt) -> Value {
         "pupil_e0_mm": camera.pupil().e0.mm(),
         "pupil_e1_mm": camera.pupil().e1.mm(),
         "tangential": camera.asymmetry().tangential,
+        "tangential_growth": camera.asymmetry().growth,
         "prism": camera.asymmetry().prism,
         "further_terms": camera.further_terms(),
         "model": camera.foreign_model().map(|model| {

@@ -16,7 +16,7 @@ fn lens() -> KannalaBrandt {
     let size = ImageSize { width: 960, height: 600 };
     let central = KannalaBrandt::from_opencv(opencv, Angle::from_deg(85.0), size).expect("a lens");
     let moving = central.with_pupil(Pupil::from_mm([2.77, 0.3])).expect("a pupil");
-    let asymmetry = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4] };
+    let asymmetry = Asymmetry { tangential: [4e-4, -3e-4], prism: [5e-4, -1e-4, -4e-4, 2e-4], growth: [1e-4, -5e-5] };
     let longer = moving.with_further_terms([1e-4 / 3.0, -2e-6]).expect("small coefficients");
     longer.with_asymmetry(asymmetry).expect("small coefficients")
 }

@@ -3,12 +3,12 @@
 //! With m the place of a ray in the image of the symmetric lens, in focal lengths from the principal point, its light arrives at
 //!
 //! ```text
-//! m' = m + 2 (m·p) m + |m|² p + (s0 |m|² + s1 |m|⁴, s2 |m|² + s3 |m|⁴)
+//! m' = m + 2 (m·P) m + |m|² P + (s0 |m|² + s1 |m|⁴, s2 |m|² + s3 |m|⁴),  P = (p1, p2) + |m|² (p3, p4)
 //! ```
 //!
-//! p is decentring (D. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966; OpenCV has p1 and p2 in the other
-//! order), s is thin prism distortion (J. Weng, P. Cohen and M. Herniou, "Camera calibration with distortion models and accuracy
-//! evaluation", PAMI 14(10), 1992, with terms of the fourth power). The direction on the axis stays where it is.
+//! P is decentring (D. Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32(3), 1966, where it grows with the radius
+//! along p; OpenCV has p1 and p2 in the other order), s is thin prism distortion (J. Weng, P. Cohen and M. Herniou, "Camera calibration with
+//! distortion models and accuracy evaluation", PAMI 14(10), 1992, with the fourth power). The direction on the axis stays where it is.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 
@@ -16,7 +16,7 @@ use crate::lens_derivatives::inverse;
 use crate::{InvalidLens, KannalaBrandt, Pixel};
 
 /// Number of coefficients of an [`Asymmetry`].
-pub(crate) const ASYMMETRY: usize = 6;
+pub(crate) const ASYMMETRY: usize = 8;
 
 /// By how much a lens is not symmetric about its axis. The default is symmetric.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,20 +25,22 @@ pub struct Asymmetry {
     pub tangential: [f64; 2],
     /// Thin prism: s0 and s1 along u, s2 and s3 along v; s0 and s2 per focal length, s1 and s3 per focal length cubed.
     pub prism: [f64; 4],
+    /// How decentring grows with the square of the radius: p3 and p4, per focal length cubed.
+    pub growth: [f64; 2],
 }
 
 impl Asymmetry {
-    /// The coefficients in the order p1, p2, s0, s1, s2, s3.
+    /// The coefficients in the order p1, p2, s0, s1, s2, s3, p3, p4.
     #[must_use]
     pub const fn to_array(&self) -> [f64; ASYMMETRY] {
-        let ([p1, p2], [s0, s1, s2, s3]) = (self.tangential, self.prism);
-        [p1, p2, s0, s1, s2, s3]
+        let ([p1, p2], [s0, s1, s2, s3], [p3, p4]) = (self.tangential, self.prism, self.growth);
+        [p1, p2, s0, s1, s2, s3, p3, p4]
     }
 
     /// The asymmetry of [`Self::to_array`].
     #[must_use]
-    pub const fn from_array([p1, p2, s0, s1, s2, s3]: [f64; ASYMMETRY]) -> Self {
-        Self { tangential: [p1, p2], prism: [s0, s1, s2, s3] }
+    pub const fn from_array([p1, p2, s0, s1, s2, s3, p3, p4]: [f64; ASYMMETRY]) -> Self {
+        Self { tangential: [p1, p2], prism: [s0, s1, s2, s3], growth: [p3, p4] }
     }
 
     /// Whether all coefficients are zero.
@@ -50,8 +52,8 @@ impl Asymmetry {
     /// m' of the module's head.
     #[must_use]
     pub fn moved(&self, m: Vector2<f64>) -> Vector2<f64> {
-        let (p, square) = (Vector2::from(self.tangential), m.norm_squared());
-        let [s0, s1, s2, s3] = self.prism;
+        let square = m.norm_squared();
+        let (p, [s0, s1, s2, s3]) = (Vector2::from(self.tangential) + Vector2::from(self.growth) * square, self.prism);
         let prism = Vector2::new(s0 + s1 * square, s2 + s3 * square) * square;
         m + m * (2.0 * m.dot(&p)) + p * square + prism
     }
@@ -59,9 +61,10 @@ impl Asymmetry {
     /// The derivative of m' by m.
     #[must_use]
     pub fn by_place(&self, m: Vector2<f64>) -> Matrix2<f64> {
-        let (p, square) = (Vector2::from(self.tangential), m.norm_squared());
-        let [s0, s1, s2, s3] = self.prism;
-        let by_square = Vector2::new(s0 + 2.0 * s1 * square, s2 + 2.0 * s3 * square);
+        let (square, growth, [s0, s1, s2, s3]) = (m.norm_squared(), Vector2::from(self.growth), self.prism);
+        let p = Vector2::from(self.tangential) + growth * square;
+        let by_square =
+            Vector2::new(s0 + 2.0 * s1 * square, s2 + 2.0 * s3 * square) + m * (2.0 * m.dot(&growth)) + growth * square;
         let across = m * p.transpose() + (p + by_square) * m.transpose();
         Matrix2::identity() * (1.0 + 2.0 * m.dot(&p)) + across * 2.0
     }
@@ -69,10 +72,9 @@ impl Asymmetry {
     /// The derivative of m' by the coefficients, in the order of [`Self::to_array`].
     #[must_use]
     pub fn by_coefficients(m: Vector2<f64>) -> SMatrix<f64, 2, ASYMMETRY> {
-        let square = m.norm_squared();
-        let fourth = square * square;
-        let (xx, xy, yy) = (2.0 * m.x * m.x + square, 2.0 * m.x * m.y, 2.0 * m.y * m.y + square);
-        SMatrix::from_row_slice(&[xx, xy, square, fourth, 0.0, 0.0, xy, yy, 0.0, 0.0, square, fourth])
+        let ([u, v], square) = ([Vector2::x(), Vector2::y()], m.norm_squared());
+        let (p1, p2, fourth) = (m * (2.0 * m.x) + u * square, m * (2.0 * m.y) + v * square, square * square);
+        SMatrix::from_columns(&[p1, p2, u * square, u * fourth, v * square, v * fourth, p1 * square, p2 * square])
     }
 
     /// m by m', with Newton's method. `None` where the image folds, which is outside the field of every lens that

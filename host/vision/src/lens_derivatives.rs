@@ -9,8 +9,8 @@ use crate::{Angle, Asymmetry, Frame, KannalaBrandt, Pupil, UnitRay};
 
 /// Number of lens parameters. Their order is that of [`LENS_PARAMETER_NAMES`]: fx, fy, cx, cy in pixels, then k1 to k4 as defined by OpenCV
 /// fisheye, then the pupil's coefficients e0 and e1 in millimetres ([`Pupil`]), which move the origin of a ray and not its direction, then
-/// p1, p2 and s0 to s3 of [`Asymmetry`], then k5 and k6 of [`KannalaBrandt::further_terms`].
-pub const LENS_PARAMETERS: usize = 18;
+/// p1, p2 and s0 to s3 of [`Asymmetry`], then k5 and k6 of [`KannalaBrandt::further_terms`], then p3 and p4 of the asymmetry.
+pub const LENS_PARAMETERS: usize = 20;
 /// Names of the lens parameters in files, in their order.
 pub const LENS_PARAMETER_NAMES: [&str; LENS_PARAMETERS] = [
     "fx",
@@ -31,15 +31,17 @@ pub const LENS_PARAMETER_NAMES: [&str; LENS_PARAMETERS] = [
     "prism_s3",
     "radial_k5",
     "radial_k6",
+    "tangential_p3",
+    "tangential_p4",
 ];
 /// Number of the parameters before e0: those of a central, symmetric lens.
 pub const CENTRAL_PARAMETERS: usize = 8;
 /// Indices of e0 and e1.
 pub(crate) const PUPIL: [usize; 2] = [8, 9];
-/// Index of p1.
-const FIRST_OF_ASYMMETRY: usize = 10;
-/// Index of k5.
-const FURTHER: usize = 16;
+/// Indices of the coefficients of the asymmetry, in the order of [`Asymmetry::to_array`].
+const ASYMMETRIC: [usize; 8] = [10, 11, 12, 13, 14, 15, 18, 19];
+/// Indices of k5 and k6.
+const FURTHER: [usize; 2] = [16, 17];
 
 /// A lens's local geometry at a ray: the angle θ, the radial and tangential directions in space and in the image, and
 /// the resolution along each.
@@ -181,13 +183,13 @@ pub(crate) fn pixel_by_lens(
     columns[(0, 2)] = 1.0;
     columns[(1, 3)] = 1.0;
     let (mut power, squared) = (theta, theta * theta);
-    for column in (4..CENTRAL_PARAMETERS).chain(FURTHER..LENS_PARAMETERS) {
+    for column in (4..CENTRAL_PARAMETERS).chain(FURTHER) {
         power *= squared;
         columns[(0, column)] = fx * power * outward.x;
         columns[(1, column)] = fy * power * outward.y;
     }
     let by_asymmetry = Asymmetry::by_coefficients(place);
-    for (column, by) in (FIRST_OF_ASYMMETRY..).zip(by_asymmetry.column_iter()) {
+    for (column, by) in ASYMMETRIC.into_iter().zip(by_asymmetry.column_iter()) {
         columns[(0, column)] = fx * by.x;
         columns[(1, column)] = fy * by.y;
     }

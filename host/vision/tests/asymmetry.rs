@@ -10,7 +10,8 @@ use vergence_vision::{
 };
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
-const ASYMMETRY: Asymmetry = Asymmetry { tangential: [0.0012, -0.0007], prism: [0.0009, -0.0002, -0.0011, 0.0003] };
+const ASYMMETRY: Asymmetry =
+    Asymmetry { tangential: [0.0012, -0.0007], prism: [0.0009, -0.0002, -0.0011, 0.0003], growth: [2e-4, -1e-4] };
 
 fn central() -> KannalaBrandt {
     let opencv = OpenCvFisheye { fx: 599.1, fy: 599.1, cx: 1024.0, cy: 1024.0, k: [-0.052, 0.0041, -0.0019, 0.0002] };
@@ -19,16 +20,16 @@ fn central() -> KannalaBrandt {
 
 /// With an aspect ratio too, so that no factor of it is lost.
 fn of(parameters: [f64; LENS_PARAMETERS]) -> KannalaBrandt {
-    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, further @ ..] = parameters;
+    let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4] = parameters;
     let opencv = OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] };
-    let central = KannalaBrandt::from_opencv_with(opencv, further, Angle::from_deg(105.0), SIZE).unwrap();
+    let central = KannalaBrandt::from_opencv_with(opencv, [k5, k6], Angle::from_deg(105.0), SIZE).unwrap();
     let moving = central.with_pupil(Pupil::from_mm([e0, e1])).unwrap();
-    moving.with_asymmetry(Asymmetry::from_array([p1, p2, s0, s1, s2, s3])).unwrap()
+    moving.with_asymmetry(Asymmetry::from_array([p1, p2, s0, s1, s2, s3, p3, p4])).unwrap()
 }
 
 const PARAMETERS: [f64; LENS_PARAMETERS] = [
     599.1, 606.0, 1020.0, 1031.0, -0.052, 0.0041, -0.0019, 0.0002, 2.77, 0.056, 0.0012, -0.0007, 0.0009, -0.0002,
-    -0.0011, 0.0003, -4e-5, 3e-6,
+    -0.0011, 0.0003, -4e-5, 3e-6, 2e-4, -1e-4,
 ];
 
 fn ray(theta: f64, phi: f64) -> UnitRay<Camera> {
@@ -42,11 +43,11 @@ fn points_are_imaged_where_the_formulas_say() {
     let moving = central().with_pupil(Pupil::from_mm([2.77, 0.056])).unwrap();
     let lens = moving.with_asymmetry(ASYMMETRY).unwrap();
     for ([x, y, z], u, v) in [
-        ([200.0, 0.0, 100.0], 1651.19996689376, 1023.0406541278),
-        ([0.0, -350.0, -40.0], 1026.10109897527, 156.035356847628),
-        ([150.0, 100.0, 300.0], 1290.32353311241, 1201.02491771534),
-        ([30.0, 0.0, -5.0], 1931.67363569433, 1022.47881465101),
-        ([1.0, 2.0, 500.0], 1025.19821499134, 1026.39635809195),
+        ([200.0, 0.0, 100.0], 1651.6241373563, 1022.96995905071),
+        ([0.0, -350.0, -40.0], 1026.62120932355, 155.255191325212),
+        ([150.0, 100.0, 300.0], 1290.34216114092, 1201.02603539705),
+        ([30.0, 0.0, -5.0], 1933.52213285286, 1022.17073179126),
+        ([1.0, 2.0, 500.0], 1025.19821499139, 1026.39635809193),
     ] {
         let pixel = lens.project_point(&Point::<Camera>::from_mm(Vector3::new(x, y, z))).unwrap();
         assert!((pixel.u - u).abs() < 1e-9 && (pixel.v - v).abs() < 1e-9, "{pixel:?}");
@@ -57,7 +58,7 @@ fn points_are_imaged_where_the_formulas_say() {
 #[test]
 fn the_asymmetry_is_that_of_fisheye624() {
     let k = [-0.02, 0.003, -0.001, 0.0002, -1e-5, 1e-6];
-    let asymmetry = Asymmetry { tangential: [1e-3, -5e-4], prism: [2e-4, -1e-4, 3e-4, 5e-5] };
+    let asymmetry = Asymmetry { tangential: [1e-3, -5e-4], prism: [2e-4, -1e-4, 3e-4, 5e-5], growth: [0.0; 2] };
     for ([x, y, z], u, v) in
         [([0.3, -0.2, 0.9], 1213.947358211, 895.420190998), ([-0.7, 0.4, -0.1], 184.906396393, 1502.216843003)]
     {
@@ -154,6 +155,7 @@ fn a_symmetric_lens_stands_in() {
     let dropped = of({
         let mut parameters = PARAMETERS;
         parameters[10..16].fill(0.0);
+        parameters[18..].fill(0.0);
         parameters
     });
     let dropped = dropped.central_at(Length::from_mm(500.0)).unwrap();

@@ -5,9 +5,9 @@
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use vergence_vision::{
-    Angle, Asymmetry, BatchLens, BatchPair, Camera, ImageSize, Instructions, InvalidLens, KannalaBrandt, Left, Length,
-    OpenCvFisheye, Pixel, Point, PointUncertainty, Pupil, Right, SharedCovariance, StereoPair, Transform, UnitRay,
-    pseudo_intersection,
+    Angle, Asymmetry, BatchLens, BatchPair, Camera, ImageSize, Instructions, InvalidLens, KannalaBrandt,
+    LENS_PARAMETERS, Left, Length, OpenCvFisheye, Pixel, Point, PointUncertainty, Pupil, Right, SharedCovariance,
+    StereoPair, Transform, UnitRay, pseudo_intersection,
 };
 
 const SIZE: ImageSize = ImageSize { width: 2048, height: 2048 };
@@ -35,7 +35,7 @@ fn apart(a: Pixel, b: Pixel) -> f64 {
 fn a_symmetric_radius_of_six_terms_is_that_of_fisheye624() {
     let opencv = OpenCvFisheye { fx: 600.0, fy: 600.0, cx: 1024.0, cy: 1022.0, k: [-0.02, 0.003, -0.001, 0.0002] };
     let lens = KannalaBrandt::from_opencv_with(opencv, [-1e-5, 1e-6], FIELD, SIZE).unwrap();
-    let asymmetry = Asymmetry { tangential: [1e-3, -5e-4], prism: [2e-4, -1e-4, 3e-4, 5e-5] };
+    let asymmetry = Asymmetry { tangential: [1e-3, -5e-4], prism: [2e-4, -1e-4, 3e-4, 5e-5], growth: [0.0; 2] };
     let lens = lens.with_asymmetry(asymmetry).unwrap();
     for (at, u, v) in
         [([0.3, -0.2, 0.9], 1213.947358211, 895.420190998), ([-0.7, 0.4, -0.1], 184.906396393, 1502.216843003)]
@@ -161,7 +161,7 @@ proptest! {
         let lenses = [lens(0.0), lens(0.0)];
         let left_from_right = Transform::<Left, Right>::new(Default::default(), Vector3::new(140.0, 2.0, -3.0));
         let pair = StereoPair { left: &lenses[0], right: &lenses[1], left_from_right };
-        let mut covariance = nalgebra::SMatrix::<f64, 18, 18>::zeros();
+        let mut covariance = nalgebra::SMatrix::<f64, LENS_PARAMETERS, LENS_PARAMETERS>::zeros();
         (covariance[(16, 16)], covariance[(17, 17)]) = (1e-10, 1e-12);
         let shared = SharedCovariance::exact().with_lenses([&covariance, &covariance]);
         let point = Point::<Left>::from_mm(ray(theta, phi).vector() * range);

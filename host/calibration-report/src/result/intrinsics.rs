@@ -24,6 +24,8 @@ const NAMES: [&str; LENS_PARAMETERS] = [
     "s3",
     "k5",
     "k6",
+    "p3",
+    "p4",
 ];
 
 /// How the target bows.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use vergence_vision::median;
 
 use super::bundle::{Bundle, SHARED, Shared};
-use super::lens::{CENTRAL, E0, E1, K5, LENS, LensParameters};
+use super::lens::{CENTRAL, E0, E1, K5, K6, LENS, LensParameters};
 use super::observations::{FEWEST_CORNERS, FEWEST_VIEWS, Observation, ObservedView};
 use super::prior::{FINEST, Prior, Strength};
 use super::start::Start;
@@ -77,7 +77,7 @@ impl Terms {
             E0 => self.e0,
             E1 => self.e1,
             LENS.. => self.bow,
-            K5.. => self.further,
+            K5 | K6 => self.further,
             other => other < CENTRAL || self.asymmetry,
         };
         (0..SHARED).filter(|&parameter| has(parameter)).collect()

@@ -198,6 +198,8 @@ mod tests {
             s3,
             k5,
             k6,
+            p3,
+            p4,
             warp_x,
             warp_y,
             a,
@@ -228,7 +230,9 @@ mod tests {
         let s = theta * theta;
         let scale = theta * ((((((k6 * s + k5) * s + k4) * s + k3) * s + k2) * s + k1) * s + 1.0) / rho;
         let (m, n) = (scale * x, scale * y);
-        let (square, along) = (m * m + n * n, (m * p1 + n * p2) * 2.0);
+        let square = m * m + n * n;
+        let (p1, p2) = (p1 + p3 * square, p2 + p4 * square);
+        let along = (m * p1 + n * p2) * 2.0;
         let (u, v) = (s0 + s1 * square + p1, s2 + s3 * square + p2);
         [cx + fx * (m + along * m + u * square), cy + fy * (n + along * n + v * square)]
     }
@@ -243,13 +247,14 @@ mod tests {
             warp_mm in prop::array::uniform2(-3.0..3.0),
             pupil_mm in prop_oneof![Just(0.0), -1.0..3.0],
             [e1, p1, p2, s0, s1, s2, s3] in prop_oneof![Just([0.0; 7]), prop::array::uniform7(-0.01..0.01)],
+            [p3, p4] in prop_oneof![Just([0.0; 2]), prop::array::uniform2(-0.01..0.01)],
             [k5, k6] in prop_oneof![Just([0.0; 2]), prop::array::uniform2(-1e-4..1e-4)],
         ) {
             let pose = Isometry3::new(Vector3::new(x, y, z), Vector3::from(turn));
             let observation = Observation { target, bow, pixel: [0.0; 2], relative_sigma: 1.0, index: 0, used: true };
             let central = [300.0, 310.0, 600.0, 500.0, 0.02, -0.01, 0.004, -0.001];
             let [fx, fy, cx, cy, k1, k2, k3, k4] = central;
-            let lens = LensParameters::from_array([fx, fy, cx, cy, k1, k2, k3, k4, pupil_mm, 10.0 * e1, p1, p2, s0, s1, s2, s3, k5, k6]);
+            let lens = LensParameters::from_array([fx, fy, cx, cy, k1, k2, k3, k4, pupil_mm, 10.0 * e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4]);
             let shared = Shared { lens, warp_mm };
             let projected = pose * shared.on_target(&observation);
             // Where the derivatives are not huge: away from the camera and from the direction straight behind it.

@@ -30,11 +30,11 @@ use crate::Loss;
 use crate::reprojection::POSE;
 use crate::schur_lm::{SchurNormal, linearise};
 
-/// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of six unknowns
-/// chance gives it once in 25,000 calibrations.
+/// Chi-squared by which the fit must get worse without parameters that count as found: of one unknown 5.5 standard deviations; of eight unknowns
+/// chance gives it once in 5,000 calibrations.
 pub(crate) const LEAST_GAIN: f64 = 30.0;
-/// Chi-squared of the six unknowns of an asymmetry that chance exceeds once in 100 calibrations of a symmetric lens.
-const CHANCE_OF_ASYMMETRY: f64 = 16.8;
+/// Chi-squared of the eight unknowns of an asymmetry that chance exceeds once in 100 calibrations of a symmetric lens.
+const CHANCE_OF_ASYMMETRY: f64 = 20.1;
 /// The same of the two unknowns of a bow.
 const CHANCE_OF_BOW: f64 = 9.2;
 /// A bow of so many millimetres moves corners of a tilted target by a tenth of a pixel at 350 mm.
@@ -45,7 +45,7 @@ const SMALL_BOW_MM: f64 = 0.1;
 pub enum LensStep {
     /// The second coefficient e1 of the pupil.
     PupilGrowth,
-    /// Decentring p1, p2 and thin prism s0 to s3.
+    /// Decentring p1 to p4 and thin prism s0 to s3.
     Asymmetry,
     /// Terms k5 and k6 of the radius beyond θ⁹.
     FurtherTerms,

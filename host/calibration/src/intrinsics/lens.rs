@@ -11,8 +11,9 @@ use vergence_vision::{
 pub(crate) const LENS: usize = LENS_PARAMETERS;
 /// The parameters of a central and symmetric lens: those before e0.
 pub(crate) const CENTRAL: usize = CENTRAL_PARAMETERS;
-/// Index of k5, the first of the further radial terms: the last two parameters.
-pub(crate) const K5: usize = LENS - 2;
+/// Indices of k5 and k6, the further radial terms.
+pub(crate) const K5: usize = E1 + 7;
+pub(crate) const K6: usize = K5 + 1;
 /// Index of the pupil's e0, and of e1.
 pub(crate) const E0: usize = CENTRAL;
 pub(crate) const E1: usize = CENTRAL + 1;
@@ -104,7 +105,8 @@ pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Optio
     };
     let place = Vector2::new(scale * x, scale * y);
     let by_asymmetry = Asymmetry::by_coefficients(place);
-    let [p1, p2, s0, s1, s2, s3] = std::array::from_fn(|i| [fx * by_asymmetry[(0, i)], fy * by_asymmetry[(1, i)]]);
+    let [p1, p2, s0, s1, s2, s3, p3, p4] =
+        std::array::from_fn(|i| [fx * by_asymmetry[(0, i)], fy * by_asymmetry[(1, i)]]);
     let mut seen = Reprojection {
         pixel: [lens.cx + fx * scale * x, lens.cy + fy * scale * y],
         by_lens: [
@@ -126,6 +128,8 @@ pub(super) fn reprojected(lens: &LensParameters, point: &Point<Camera>) -> Optio
             s3,
             power(5),
             power(6),
+            p3,
+            p4,
         ],
         by_point: [
             [fx * (scale + x * x * bend), fy * x * y * bend],
@@ -159,7 +163,7 @@ impl Reprojection {
         self.pixel = [cx + fx * arrived.x, cy + fy * arrived.y];
         (self.by_lens[0], self.by_lens[1]) = ([arrived.x, 0.0], [0.0, arrived.y]);
         let (before, further) = self.by_lens.split_at_mut(K5);
-        for column in before[4..=E1].iter_mut().chain(further).chain(&mut self.by_point) {
+        for column in before[4..=E1].iter_mut().chain(&mut further[..2]).chain(&mut self.by_point) {
             let by = bend * Vector2::new(column[0] / fx, column[1] / fy);
             *column = [fx * by.x, fy * by.y];
         }
@@ -185,20 +189,20 @@ impl LensParameters {
     #[must_use]
     pub const fn to_array(&self) -> [f64; LENS_PARAMETERS] {
         let OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] } = self.central;
-        let ([e0, e1], [p1, p2, s0, s1, s2, s3]) = (self.pupil.mm(), self.asymmetry.to_array());
+        let ([e0, e1], [p1, p2, s0, s1, s2, s3, p3, p4]) = (self.pupil.mm(), self.asymmetry.to_array());
         let [k5, k6] = self.further;
-        [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6]
+        [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4]
     }
 
     /// The lens of [`Self::to_array`].
     #[must_use]
     pub const fn from_array(parameters: [f64; LENS_PARAMETERS]) -> Self {
-        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, further @ ..] = parameters;
+        let [fx, fy, cx, cy, k1, k2, k3, k4, e0, e1, p1, p2, s0, s1, s2, s3, k5, k6, p3, p4] = parameters;
         Self {
             central: OpenCvFisheye { fx, fy, cx, cy, k: [k1, k2, k3, k4] },
             pupil: Pupil::from_mm([e0, e1]),
-            asymmetry: Asymmetry::from_array([p1, p2, s0, s1, s2, s3]),
-            further,
+            asymmetry: Asymmetry::from_array([p1, p2, s0, s1, s2, s3, p3, p4]),
+            further: [k5, k6],
             foreign: None,
         }
     }

@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::adjust::{Adjusted, median_of_used};
-use super::lens::{E0, E1, LENS};
+use super::lens::{E0, E1, K6, LENS};
 use super::observations::ObservedView;
 
 /// A sum of parameters with weights, the first of them 1, that is zero within a standard deviation.
@@ -20,7 +20,7 @@ pub(super) struct Known {
 }
 
 /// All that is known, each independent of the others.
-pub(super) const KNOWN: [Known; 10] = [
+pub(super) const KNOWN: [Known; 12] = [
     // e0 in millimetres: twice the focal length of common lenses.
     Known { sum: &[(E0, 1.0)], sigma: 3.0 },
     // e1 in millimetres: the traced designs have 0.06 and 0.36 (sigma8_f18, nikkor6_f28).
@@ -31,12 +31,14 @@ pub(super) const KNOWN: [Known; 10] = [
     Known { sum: &[(S2, 1.0), (P2, SQUARE_BY_P)], sigma: SQUARE },
     Known { sum: &[(S1, 1.0), (P1, FOURTH_BY_P), (S0, FOURTH_BY_SQUARE)], sigma: FOURTH },
     Known { sum: &[(S3, 1.0), (P2, FOURTH_BY_P), (S2, FOURTH_BY_SQUARE)], sigma: FOURTH },
+    Known { sum: &[(P3, 1.0), (P1, GROWTH_BY_P), (S0, GROWTH_BY_SQUARE), (S1, GROWTH_BY_FOURTH)], sigma: GROWTH },
+    Known { sum: &[(P4, 1.0), (P2, GROWTH_BY_P), (S2, GROWTH_BY_SQUARE), (S3, GROWTH_BY_FOURTH)], sigma: GROWTH },
     // The bow of the target in millimetres, as boards of paper have.
     Known { sum: &[(BOW, 1.0)], sigma: 1.0 },
     Known { sum: &[(BOW + 1, 1.0)], sigma: 1.0 },
 ];
 /// Which of them are of decentring and thin prism.
-const ASYMMETRY: Range<usize> = 2..8;
+const ASYMMETRY: Range<usize> = 2..10;
 
 // Indices of the parameters, in the order of `LENS_PARAMETERS`.
 const P1: usize = E1 + 1;
@@ -45,19 +47,24 @@ const S0: usize = E1 + 3;
 const S1: usize = E1 + 4;
 const S2: usize = E1 + 5;
 const S3: usize = E1 + 6;
+const P3: usize = K6 + 1;
+const P4: usize = K6 + 2;
 /// The first of the two parameters of the target.
 pub(super) const BOW: usize = LENS;
 
 // Decentring and thin prism of badly mounted lenses, which go together: `sigma8_f18` traced with every element 10 micrometres off the axis and
-// tilted by 0.05 degrees, and a sensor tilted by 0.4 degrees, has standard deviations of 7e-4 of p, 1.4e-3 of s0 and s2, 7e-4 of s1 and s3, and
-// correlations of -0.81 of the first two, -0.50 of the first and the last, 0.81 of the last two (docs/measured/lenses.md). Below, s0 beside
-// what p lets expect, and s1 beside what both do.
+// tilted by 0.05 degrees, and a sensor tilted by 0.4 degrees, has standard deviations of 6e-4 of p1 and p2, 1.2e-3 of s0 and s2, 3.2e-4 of s1 and
+// s3, and 1.9e-4 of p3 and p4 (docs/measured/lenses.md). Below, each beside what those before it let expect.
 const P: f64 = 7e-4;
-const SQUARE: f64 = 8.2e-4;
-const SQUARE_BY_P: f64 = 1.62;
-const FOURTH: f64 = 3.7e-4;
-const FOURTH_BY_P: f64 = -0.454;
-const FOURTH_BY_SQUARE: f64 = -0.589;
+const SQUARE: f64 = 8.4e-4;
+const SQUARE_BY_P: f64 = 1.5;
+const FOURTH: f64 = 1.7e-4;
+const FOURTH_BY_P: f64 = -0.38;
+const FOURTH_BY_SQUARE: f64 = -0.32;
+const GROWTH: f64 = 4.5e-5;
+const GROWTH_BY_P: f64 = -0.073;
+const GROWTH_BY_SQUARE: f64 = -0.027;
+const GROWTH_BY_FOURTH: f64 = 0.60;
 
 /// By how much the views narrow what was known of decentring and thin prism, in the direction of them of which they say least: the standard
 /// deviation that is left, in parts of that before, where the variance of a residual is `variance`. `None` where that is not known.

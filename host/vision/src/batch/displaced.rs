@@ -12,8 +12,7 @@ const LANES: usize = 16;
 /// A lens that is not symmetric.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Displaced {
-    p: [f64; 2],
-    s: [f64; 4],
+    asymmetry: Asymmetry,
     centre: [f64; 2],
     focal_lengths: [f64; 2],
     /// Newton's steps that reach every place of the field.
@@ -23,14 +22,8 @@ pub(super) struct Displaced {
 impl Displaced {
     /// `None` for a symmetric lens, and where Newton's method takes long.
     pub(super) fn new(lens: &KannalaBrandt) -> Option<Self> {
-        let (Asymmetry { tangential, prism }, [f, ..], centre) = (lens.asymmetry(), lens.k(), lens.centre());
-        let lanes = Self {
-            p: tangential,
-            s: prism,
-            centre: [centre.u, centre.v],
-            focal_lengths: [f, f * lens.aspect()],
-            steps: 0,
-        };
+        let (asymmetry, [f, ..], centre) = (lens.asymmetry(), lens.k(), lens.centre());
+        let lanes = Self { asymmetry, centre: [centre.u, centre.v], focal_lengths: [f, f * lens.aspect()], steps: 0 };
         if lens.is_symmetric() {
             return None;
         }
@@ -42,13 +35,12 @@ impl Displaced {
         const RINGS: usize = 16;
         const AROUND: usize = 48;
         const LARGEST_ERROR: f64 = 1e-15;
-        let asymmetry = lens.asymmetry();
         let radius = lens.radius_max() / lens.k()[0];
         (0..RINGS * AROUND).all(|place| {
             let ring = radius * (place / AROUND + 1) as f64 / RINGS as f64;
             let (sin, cos) = (std::f64::consts::TAU * (place % AROUND) as f64 / AROUND as f64).sin_cos();
             let m = nalgebra::Vector2::new(ring * cos, ring * sin);
-            let moved = asymmetry.moved(m);
+            let moved = self.asymmetry.moved(m);
             let ([x], [y]) = self.back::<false, 1>([moved.x], [moved.y]);
             (x - m.x).hypot(y - m.y) <= 4.0 * LARGEST_ERROR * (1.0 + ring)
         })
@@ -77,16 +69,18 @@ impl Displaced {
     /// m by m'.
     #[inline(always)]
     fn back<const FUSED: bool, const W: usize>(&self, x: [f64; W], y: [f64; W]) -> ([f64; W], [f64; W]) {
-        let ([p1, p2], [s0, s1, s2, s3]) = (self.p, self.s);
+        let [p1, p2, s0, s1, s2, s3, q1, q2] = self.asymmetry.to_array();
         let (mut a, mut b) = (x, y);
         for _ in 0..self.steps {
             for j in 0..W {
                 let (m, n) = (a[j], b[j]);
                 let square = m * m + n * n;
+                let (p1, p2) = (p1 + q1 * square, p2 + q2 * square);
                 let along = 2.0 * (m * p1 + n * p2);
                 let (u, v) = (p1 + s0 + s1 * square, p2 + s2 + s3 * square);
                 let (off_x, off_y) = (x[j] - (m + along * m + u * square), y[j] - (n + along * n + v * square));
-                let (by_u, by_v) = (u + s1 * square, v + s3 * square);
+                let lift = 2.0 * (m * q1 + n * q2);
+                let (by_u, by_v) = (u + (s1 + q1) * square + lift * m, v + (s3 + q2) * square + lift * n);
                 let xx = 1.0 + along + 2.0 * (m * p1 + by_u * m);
                 let xy = 2.0 * (m * p2 + by_u * n);
                 let yx = 2.0 * (n * p1 + by_v * m);
@@ -119,11 +113,13 @@ impl Kernel<2, 2> for Displaced {
 
 #[inline(always)]
 fn displace(lens: &Displaced, pixels: &mut [[f64; 2]]) {
-    let ([cx, cy], [fx, fy], [p1, p2], [s0, s1, s2, s3]) = (lens.centre, lens.focal_lengths, lens.p, lens.s);
+    let ([cx, cy], [fx, fy]) = (lens.centre, lens.focal_lengths);
+    let [p1, p2, s0, s1, s2, s3, q1, q2] = lens.asymmetry.to_array();
     let (over_x, over_y) = (1.0 / fx, 1.0 / fy);
     for [u, v] in pixels {
         let (m, n) = ((*u - cx) * over_x, (*v - cy) * over_y);
         let square = m * m + n * n;
+        let (p1, p2) = (p1 + q1 * square, p2 + q2 * square);
         let along = 2.0 * (m * p1 + n * p2);
         *u = cx + fx * (m + along * m + (p1 + s0 + s1 * square) * square);
         *v = cy + fy * (n + along * n + (p2 + s2 + s3 * square) * square);

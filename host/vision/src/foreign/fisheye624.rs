@@ -46,7 +46,7 @@ impl Formula for Fisheye624 {
         let squared = theta * theta;
         let series = self.radial.iter().rev().fold(0.0, |sum, k| (sum + k) * squared);
         let scale = if rho > 0.0 { theta * (1.0 + series) / rho } else { 1.0 };
-        let displaced = Asymmetry { tangential: self.tangential, prism: self.prism };
+        let displaced = Asymmetry { tangential: self.tangential, prism: self.prism, ..Asymmetry::default() };
         let at = displaced.moved(Vector2::new(scale * d.x, scale * d.y));
         let [fx, fy, cx, cy] = self.pinhole;
         Some(Pixel { u: fx * at.x + cx, v: fy * at.y + cy })

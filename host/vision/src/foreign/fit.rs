@@ -94,12 +94,12 @@ fn apart(a: Pixel, b: Pixel) -> f64 {
     (a.u - b.u).hypot(a.v - b.v)
 }
 
-/// The lens with decentring and thin prism, by Gauss-Newton steps over all but the pupil's parameters. `None` where the samples do not
+/// The lens with decentring and thin prism, by Gauss-Newton steps over these and those of a central lens. `None` where the samples do not
 /// determine them, or the image would fold.
 fn asymmetric(symmetric: &KannalaBrandt, samples: &[Sample]) -> Option<KannalaBrandt> {
     const STEPS: usize = 8;
-    /// Columns of the derivatives: those before the pupil's and those after it.
-    const COLUMNS: [usize; 14] = [0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15];
+    /// Columns of the derivatives: those of a central lens, and those of the asymmetry.
+    const COLUMNS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12, 13, 14, 15, 18, 19];
     let mut lens = *symmetric;
     for _ in 0..STEPS {
         let missing = |sample: &Sample| {
