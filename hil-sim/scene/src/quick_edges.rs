@@ -135,8 +135,9 @@ fn lattice(count: usize, hash: u64) -> [[f32; MOST_OF_PIXEL]; 2] {
     let (step, (a, b)) = (1.0 / count as f32, unit_pair(hash));
     let wrapped = |part: f32| if part >= 1.0 { part - 1.0 } else { part };
     let (mut places, mut at) = ([[0.0; MOST_OF_PIXEL]; 2], [a as f32, b as f32]);
-    for i in 0..count {
-        (places[0][i], places[1][i]) = (at[0] - 0.5, at[1] - 0.5);
+    let [us, vs] = &mut places;
+    for (u, v) in us.iter_mut().zip(vs).take(count) {
+        (*u, *v) = (at[0] - 0.5, at[1] - 0.5);
         at = [wrapped(at[0] + step), wrapped(at[1] + GOLDEN)];
     }
     places

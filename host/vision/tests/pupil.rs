@@ -23,7 +23,9 @@ fn lens(e0: f64) -> KannalaBrandt {
 fn displaced(lens: KannalaBrandt) -> KannalaBrandt {
     let growing = lens.with_pupil(Pupil { e1: Length::from_mm(0.2), ..lens.pupil() }).unwrap();
     let longer = growing.with_further_terms([-4e-5, 3e-6]).unwrap();
-    longer.with_asymmetry(Asymmetry::from_array([0.0012, -0.0007, 0.0009, -0.0002, -0.0011, 0.0003])).unwrap()
+    longer
+        .with_asymmetry(Asymmetry::from_array([0.0012, -0.0007, 0.0009, -0.0002, -0.0011, 0.0003, 2e-4, -1e-4]))
+        .unwrap()
 }
 
 fn direction(theta: f64, phi: f64) -> Vector3<f64> {
