@@ -235,7 +235,7 @@ fn the_whole_field_of_a_real_pair_gives_points() {
         let added = number(&all, "points") - number(&measured, "points");
         // The views of this set cannot tell the pupil, so that far from the axis little is certain.
         assert!(added > least * number(&measured, "points"), "{added} more points");
-        assert!(number(&all, "extrapolated") > (0.25 * added).max(10.0));
+        assert!(number(&all, "extrapolated") > (0.2 * added).max(10.0));
     }
     let table = std::fs::read_to_string(Path::new(&file("extrapolated.csv"))).expect("a table");
     let (marked, others): (Vec<_>, Vec<_>) = table.lines().skip(1).partition(|line| line.ends_with(",1,-1"));
