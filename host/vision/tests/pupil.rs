@@ -136,8 +136,8 @@ impl Pair {
             let central = KannalaBrandt::from_opencv_with(opencv, further, lens.theta_max(), SIZE).unwrap();
             let [e0, e1] = lens.pupil().mm();
             let moving = central.with_pupil(Pupil::from_mm([e0 + by[8], e1 + by[9]])).unwrap();
-            let asymmetry = lens.asymmetry().to_array();
-            moving.with_asymmetry(Asymmetry::from_array(std::array::from_fn(|i| asymmetry[i] + by[10 + i]))).unwrap()
+            let (asymmetry, at) = (lens.asymmetry().to_array(), [10, 11, 12, 13, 14, 15, 18, 19]);
+            moving.with_asymmetry(Asymmetry::from_array(std::array::from_fn(|i| asymmetry[i] + by[at[i]]))).unwrap()
         };
         let (left, rest) = by.as_slice().split_at(LENS_PARAMETERS);
         let (right, pose) = rest.split_at(LENS_PARAMETERS);
