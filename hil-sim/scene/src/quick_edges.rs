@@ -176,9 +176,8 @@ impl RayTable {
         if [du, dv].as_flattened().iter().any(|ray| ray[2].is_nan()) {
             return self.rays_at_rim(eye, at, [du, dv], (places, count));
         }
-        let slope =
-            |[before, after]: [[f32; 3]; 2]| eye.in_world([0, 1, 2].map(|axis| 0.5 * (after[axis] - before[axis])));
-        (between(eye.in_world(at), [slope(du), slope(dv)], places), count)
+        let slopes = [du, dv].map(|neighbours| eye.in_world(slope(neighbours)));
+        (between(eye.in_world(at), slopes, places), count)
     }
 
     /// [`Self::rays_at`] beside pixels outside the field, whose rays are not numbers.
@@ -190,7 +189,7 @@ impl RayTable {
         (places, count): (&[[f32; MOST_OF_PIXEL]; 2], usize),
     ) -> (Singles<MOST_OF_PIXEL>, usize) {
         let slopes = neighbours.map(|[before, after]| match [before[2].is_nan(), after[2].is_nan()] {
-            [false, false] => [0, 1, 2].map(|axis| 0.5 * (after[axis] - before[axis])),
+            [false, false] => slope([before, after]),
             [true, false] => [0, 1, 2].map(|axis| after[axis] - at[axis]),
             [false, true] => [0, 1, 2].map(|axis| at[axis] - before[axis]),
             [true, true] => [0.0; 3],
@@ -205,6 +204,11 @@ impl RayTable {
         }
         (seen, count_seen)
     }
+}
+
+/// By how much rays change from one pixel to the next, by those of both neighbours.
+fn slope([before, after]: [[f32; 3]; 2]) -> [f32; 3] {
+    [0, 1, 2].map(|axis| 0.5 * (after[axis] - before[axis]))
 }
 
 /// Rays that change evenly, by so much from one pixel to the next, through places on a pixel.

@@ -11,5 +11,5 @@ mod residual_spread;
 
 pub use lens_growth::{LensGrowth, lens_growth};
 pub use pose_drift::{PoseDrift, pose_drift};
-pub use pose_equation::moved as moved_pose;
+pub use pose_equation::{difference as pose_difference, moved as moved_pose};
 pub use pose_fusion::{FusedPose, MatchErrors, fuse_pose};

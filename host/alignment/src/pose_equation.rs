@@ -19,6 +19,7 @@ pub fn moved(pose: &Transform<Left, Right>, by: &Vector6<f64>) -> Transform<Left
 }
 
 /// The correction with which [`moved`] makes `to` of `from`.
+#[must_use]
 pub fn difference(to: &Transform<Left, Right>, from: &Transform<Left, Right>) -> Vector6<f64> {
     let turn = (to.rotation() * from.rotation().inverse()).scaled_axis();
     let shift = to.origin().mm() - from.origin().mm();

@@ -10,14 +10,12 @@
 
 mod common;
 
-use common::count;
-use nalgebra::{Vector3, Vector6};
+use common::{count, way_to_truth};
 use rayon::prelude::*;
-use vergence_alignment::FusedPose;
 use vergence_reproduce::{LensedRig, own_frame};
 use vergence_rig::{BENCH_TOML, LensField, Rig};
 use vergence_scene::LensChoice;
-use vergence_vision::{Side, Transform};
+use vergence_vision::Side;
 
 /// Baseline in millimetres and separation in degrees.
 const POSES: [[f64; 2]; 3] = [[145.0, 0.0], [145.0, 60.0], [145.0, 120.0]];
@@ -28,18 +26,12 @@ fn trial(design: LensChoice, seed: u64) -> [f64; 3] {
     let LensedRig { lenses, file, .. } = LensedRig::mounted(&drawn, design, seed).expect("it is calibrated");
     let known = Rig::from_toml(&file.expect("a file")).expect("a rig");
     let known = known.measuring_in(LensField::Measured).expect("the lenses' errors are known");
-    let turn = |side: Side| own_frame(known.camera(side), &lenses[side.index()]);
-    let left = Transform::new(turn(Side::Left), Vector3::zeros());
-    let right = Transform::new(turn(Side::Right), Vector3::zeros());
+    let turns = [Side::Left, Side::Right].map(|side| own_frame(known.camera(side), &lenses[side.index()]));
     POSES.map(|[baseline, separation]| {
         let values = [baseline, separation.to_radians()];
         let (stated, truth) = (known.pose_at_values(&values), drawn.pose_at_values(&values));
-        let (left_from_right, covariance) = (stated.left_from_right, stated.covariance());
-        let correction = Vector6::zeros();
-        let (told_by_images, agreeing, variance_factor) = (0.0, 1.0, 1.0);
-        let stated = FusedPose { left_from_right, covariance, correction, told_by_images, agreeing, variance_factor };
-        let way = stated.way_to(&(left * truth.left_from_right * right.inverse()));
-        way.dot(&covariance.cholesky().expect("a covariance").solve(&way))
+        let way = way_to_truth(&stated.left_from_right, &truth.left_from_right, turns);
+        way.dot(&stated.covariance().cholesky().expect("a covariance").solve(&way))
     })
 }
 

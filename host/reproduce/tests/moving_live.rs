@@ -20,11 +20,10 @@ use std::future::pending;
 use std::sync::Arc;
 use std::time::Duration;
 
-use common::count;
+use common::{count, way_to_truth};
 use figures::{Found, Nees, band, check, mean, tell};
 use nalgebra::{Matrix6, SymmetricEigen, UnitQuaternion, Vector3, Vector6};
 use tokio::sync::mpsc;
-use vergence_alignment::FusedPose;
 use vergence_board::{Board, Shared};
 use vergence_live::{Limits, LiveError, LiveLoop, LiveResult, MatchingTime, Measurement, Totals, drive};
 use vergence_matching::TrackingMatcher;
@@ -214,18 +213,8 @@ impl World {
         for point in &cloud.points {
             truth.judge(point, found);
         }
-        let stated = FusedPose {
-            left_from_right: pose.left_from_right,
-            covariance: pose.covariance(),
-            correction: Vector6::zeros(),
-            told_by_images: 0.0,
-            agreeing: 1.0,
-            variance_factor: 1.0,
-        };
-        let [left, right] = self.turns;
-        let (left, right) = (Transform::new(left, Vector3::zeros()), Transform::new(right, Vector3::zeros()));
-        let way = stated.way_to(&(left * truth.middle.left_from_right * right.inverse()));
-        found.poses.push(squared(&way, &stated.covariance, self.freedom()));
+        let way = way_to_truth(&pose.left_from_right, &truth.middle.left_from_right, self.turns);
+        found.poses.push(squared(&way, &pose.covariance(), self.freedom()));
         found.moving += u64::from(*moving);
     }
 }

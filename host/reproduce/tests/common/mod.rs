@@ -6,7 +6,8 @@
 
 mod robot;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use vergence_alignment::pose_difference;
 use vergence_reproduce::study;
 use vergence_vision::{Angle, Base, KannalaBrandt, Left, Length, Right, Transform};
 
@@ -28,6 +29,17 @@ pub fn left_from_middle(separation_deg: f64) -> Transform<Left, Base> {
 /// Baseline in millimetres and separation in degrees.
 pub fn around(range: f64, azimuth: f64, elevation: f64) -> Vector3<f64> {
     study::around(Length::from_mm(range), Angle::from_deg(azimuth), Angle::from_deg(elevation))
+}
+
+/// The way from a stated pose to the true one, a turn in radians and a shift in millimetres, where the frames of the left and the right camera's rays
+/// are known turned so against the true ones.
+pub fn way_to_truth(
+    stated: &Transform<Left, Right>,
+    truth: &Transform<Left, Right>,
+    [left, right]: [UnitQuaternion<f64>; 2],
+) -> Vector6<f64> {
+    let (left, right) = (Transform::new(left, Vector3::zeros()), Transform::new(right, Vector3::zeros()));
+    pose_difference(&(left * *truth * right.inverse()), stated)
 }
 
 /// The number of samples from the environment, for long runs.
